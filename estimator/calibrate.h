@@ -1,0 +1,182 @@
+// The whole engine: measured data in, everything that is reported out. No files, no clock.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/measurement.h"
+#include "estimator/noise/noise_model.h"
+
+namespace plumbline {
+
+/// Four parameters of one axis, [K_ix K_iy K_iz] in V/g and U_i0 in V, with their covariance.
+struct AxisEstimate {
+  Eigen::Vector4d value = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+};
+using TriadEstimate = PerAxis<AxisEstimate>;
+
+/// The same model estimated in several ways.
+struct ModelEstimates {
+  TriadEstimate batch_ls;
+  std::optional<TriadEstimate> rls;  ///< only for the 12-parameter model
+  TriadEstimate ekf;
+  PerAxis<double> agreement_en{};  ///< largest E_n between EKF and batch per axis
+};
+
+/// Estimates after 1, 2, … poses: for the picture "estimate against number of positions".
+struct Convergence {
+  std::vector<TriadEstimate> rls;       ///< one per pose, in visiting order
+  std::vector<TriadEstimate> ekf;       ///< one per pose
+  std::vector<TriadEstimate> batch_ls;  ///< one per pose; meaningless before four poses
+};
+
+struct EffectParameter {
+  std::string name;
+  std::optional<std::size_t> axis;
+  double value = 0;
+  double u = 0;
+  std::string unit;
+};
+
+/// An effect that the 12-parameter model lacks and the data show (FORMATS section 6).
+struct FoundEffect {
+  std::string id;
+  std::vector<std::size_t> axes;
+  std::vector<EffectParameter> parameters;
+  double p_value = 1;
+  double heldout_gain = 0;
+  std::vector<std::string> alternatives;
+  std::string separate_by;
+};
+
+/// Structure that no listed effect explains.
+struct UnlistedStructure {
+  std::string driver;
+  std::string form;  ///< bias, scale, geometry or sample
+  std::vector<std::size_t> axes;
+  std::string shape;
+  double p_value = 1;
+  double heldout_gain = 0;
+};
+
+enum class Verdict { clean, explained, partly_explained, unexplained, undetermined };
+const char* to_string(Verdict verdict);
+
+/// Test of one axis's residual against what the identified noise would leave.
+struct ResidualTest {
+  double statistic = 0;
+  double dof = 0;
+  double p_value = 1;
+};
+
+struct Diagnosis {
+  Verdict verdict = Verdict::undetermined;
+  std::string reason;  ///< one sentence for a person
+  PerAxis<ResidualTest> axis_test;
+  double p_value = 1;  ///< of the whole test
+  std::vector<FoundEffect> effects;
+  std::vector<UnlistedStructure> unlisted;
+};
+
+/// Input-referred errors in m/s² (volts / K_ii · g_n).
+struct ErrorFigures {
+  PerAxis<double> fit_pose_rms_mps2{};
+  PerAxis<double> heldout_pose_rms_mps2{};
+  PerAxis<double> heldout_pose_max_abs_mps2{};
+  PerAxis<double> sample_rms_mps2{};
+};
+
+enum class DecisionStatus { pass, fail, conditional_pass, conditional_fail, none };
+const char* to_string(DecisionStatus status);
+
+/// Conformity with the limit, with guard band (ILAC G8).
+struct Decision {
+  DecisionStatus status = DecisionStatus::none;
+  double limit_mps2 = 0;          ///< 0 without limits
+  double max_abs_error_mps2 = 0;  ///< the measured value that is judged
+  double u_mps2 = 0;              ///< its standard uncertainty
+  double guard_band_mps2 = 0;
+  std::string rule;  ///< the decision rule in words
+};
+
+/// One pose as the engine saw it, for pictures and tables; residuals are input-referred.
+struct PoseResult {
+  Pose pose;
+  double t_mean_s = 0;
+  double temp_C = 0;  ///< NaN when not recorded
+  PerAxis<double> mean_V{};
+  PerAxis<double> sd_V{};  ///< of the samples within the pose
+  PerAxis<double> residual_before_mps2{};
+  PerAxis<double> residual_after_mps2{};
+};
+
+/// Directions of the parameter space that the poses do not determine.
+struct Observability {
+  int rank = 4;          ///< of the four columns [a_x a_y a_z 1]
+  double condition = 0;  ///< of the column-scaled design
+  std::string
+      unobservable;  ///< names the direction when rank < 4, e.g. "K_z and U_0 (only a_z = 0 seen)"
+};
+
+struct CalibrationInput {
+  const MeasurementSet& run;
+  const SampleTable* static_record = nullptr;  ///< null: noise is taken from the bursts
+  const RunDescription& description;
+};
+
+struct CalibrationOptions {
+  std::uint64_t seed = 1;
+};
+
+/// Everything `result.json` and the certificate say. When observability.rank < 4 nothing below it
+/// is filled.
+struct Calibration {
+  Observability observability;
+  std::size_t poses = 0;
+  std::size_t samples = 0;
+  std::size_t skipped_rows = 0;
+  PerAxis<NoiseModel> noise;
+  ModelEstimates estimates;  ///< the paper's 12-parameter model
+  ModelEstimates final;      ///< re-estimated together with the effects; the certified model
+  Convergence convergence;
+  Diagnosis diagnosis;
+  ErrorFigures before;
+  ErrorFigures after;
+  PerAxis<double> floor_pose_rms_mps2{};
+  PerAxis<double> u_floor_pose_rms_mps2{};  ///< from the uncertainty of the noise terms
+  Decision decision;
+  std::vector<PoseResult> pose_results;
+};
+
+/// Identifies the noise, estimates the 12 parameters in three ways, tests the residual, decides.
+/// Deterministic in input and options.seed. Preconditions: every pose has at least one sample.
+Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& options);
+
+/// Errors of a calibrated model on an independent set of the same unit.
+struct EvaluationFigures {
+  PerAxis<double> pose_rms_mps2{};
+  PerAxis<double> pose_max_abs_mps2{};
+  PerAxis<double> sample_rms_mps2{};
+};
+struct Evaluation {
+  std::size_t poses = 0;
+  std::size_t samples = 0;
+  EvaluationFigures before;  ///< the 12 parameters alone
+  EvaluationFigures after;   ///< the certified model
+};
+
+/// What of a calibration is needed to apply it to other data.
+struct CertifiedModel {
+  TriadEstimate twelve;  ///< before any effect
+  TriadEstimate final;   ///< together with the effects
+  std::vector<FoundEffect> effects;
+};
+
+Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
+                    const RunDescription& description);
+
+}  // namespace plumbline

@@ -1,0 +1,58 @@
+// What rig.toml says about the head and the sensor: [head] and [sensor], read strictly.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "estimator/measurement.h"
+#include "rig/dividing_head.h"
+#include "rig/sample_source.h"
+#include "rig/strict_toml.h"
+
+namespace plumbline::rig {
+
+enum class WordOrder { high_first, low_first };
+
+/// [head]: how the drive is reached and how its registers are laid out.
+/// The defaults are those of the simulated rig (design: RIG.md's register map).
+struct HeadConfig {
+  std::string modbus;  ///< "tcp:HOST:PORT" or "rtu:DEVICE,115200,8E1"
+  int unit_id = 1;
+  std::array<int, 2> axis_base = {0x000, 0x100};  ///< register base of δ and h
+  WordOrder word_order = WordOrder::high_first;
+  std::array<double, 2> counts_per_deg = {10000.0, 10000.0};
+  double speed_deg_s = 30.0;
+  double acceleration_deg_s2 = 60.0;
+  std::chrono::milliseconds response_timeout{1000};
+  std::chrono::milliseconds poll_interval{20};
+  std::chrono::milliseconds watchdog{3000};  ///< 0 = off
+  // Register offsets and status bit numbers follow in register_map.h; the configuration may change
+  // any of them by name under [head.registers] and [head.status_bits].
+};
+
+/// A bus signal that is recorded as a covariate column.
+struct CovariateSignal {
+  std::string column;  ///< e.g. "rh_pct"
+  std::string signal;  ///< "MESSAGE.Signal" of the DBC file
+};
+
+/// [sensor]: where the frames come from and what they mean.
+struct SensorConfig {
+  std::string can;       ///< "can:can0", "unix:PATH" or "log:FILE"
+  std::string dbc_file;  ///< empty: the layout that comes with the program
+  double rate_hz = 100;  ///< nominal sample rate of the node
+  Adc adc;               ///< span of the codes
+  std::vector<CovariateSignal> covariates;
+  std::chrono::milliseconds silence_timeout{3000};
+};
+
+Result<HeadConfig> read_head_config(StrictTable& table);
+Result<SensorConfig> read_sensor_config(StrictTable& table);
+
+Result<std::unique_ptr<DividingHead>> make_dividing_head(const HeadConfig& config);
+Result<std::unique_ptr<SampleSource>> make_sample_source(const SensorConfig& config);
+
+}  // namespace plumbline::rig

@@ -1,0 +1,107 @@
+// Runs in an SQLite file: what was measured, as it arrived; one durable commit per pose.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "estimator/measurement.h"
+
+namespace plumbline::storage {
+
+using RunId = long long;
+
+enum class PoseKind { soak, grid, verification };
+enum class RunState { running, finished, stopped, failed };
+const char* to_string(PoseKind kind);
+const char* to_string(RunState state);
+
+/// What is known when a run starts.
+struct RunHeader {
+  std::string serial;
+  std::string program_version;
+  std::string config_toml;  ///< rig.toml as it was read
+  std::string plan_csv;     ///< the plan as it was printed
+  std::string started_utc;  ///< ISO 8601
+  double rate_hz = 0;
+  Adc adc;  ///< turns stored codes into volts
+};
+
+struct RunSummary {
+  RunId id = 0;
+  RunHeader header;
+  RunState state = RunState::running;
+  std::string finished_utc;
+  long long poses = 0;
+  long long samples = 0;
+};
+
+/// One covariate value on the run's clock.
+struct StoredCovariate {
+  std::string name;
+  double t_s = 0;
+  double value = 0;
+};
+
+/// One visit, complete: commanded and read-back angles and the samples as they arrived.
+struct PoseRecord {
+  long long ordinal = 0;  ///< position in the plan; unique within the run
+  PoseKind kind = PoseKind::grid;
+  double delta_deg = 0;  ///< commanded
+  double h_deg = 0;
+  double delta_enc_deg = 0;  ///< read back while sampling
+  double h_enc_deg = 0;
+  double settle_s = 0;         ///< from in-position to the first accepted sample
+  bool settle_capped = false;  ///< the hard cap ended the settling
+  std::vector<RawSample> samples;
+  std::vector<StoredCovariate> covariates;
+};
+
+struct EventRecord {
+  double t_s = 0;
+  std::string utc;
+  std::string kind;  ///< state, fault, retry, settle_cap, loss …
+  std::string text;
+};
+
+/// A run as it is handed to the engine: volts, times and columns like those of FORMATS section 2.
+struct StoredRun {
+  RunSummary summary;
+  SampleTable soak;  ///< static record; empty when the plan had none
+  MeasurementSet grid;
+  MeasurementSet verification;  ///< poses empty when the plan had none
+  std::vector<EventRecord> events;
+};
+
+/// The only writing connection. Not thread safe: one owner. Failures are ErrorCode::storage, except
+/// open() of a missing or foreign file for reading, which is ErrorCode::input.
+class RunStore {
+ public:
+  /// Creates the file and its schema when absent; migrates an older schema; refuses a newer one.
+  static Result<RunStore> open(const std::filesystem::path& file);
+  /// Read-only; the file must exist and be ours.
+  static Result<RunStore> open_read_only(const std::filesystem::path& file);
+  RunStore(RunStore&&) noexcept;
+  RunStore& operator=(RunStore&&) noexcept;
+  ~RunStore();
+
+  Result<RunId> create_run(const RunHeader& header);
+  /// Durable when it returns: pose, samples and covariates in one transaction.
+  Result<void> commit_pose(RunId run, const PoseRecord& pose);
+  Result<void> add_event(RunId run, const EventRecord& event);
+  Result<void> finish_run(RunId run, RunState state, const std::string& finished_utc);
+
+  Result<std::vector<RunSummary>> runs() const;
+  Result<StoredRun> load(RunId run) const;
+  /// Ordinals of the committed poses, ascending.
+  Result<std::vector<long long>> committed_poses(RunId run) const;
+
+ private:
+  struct Impl;
+  explicit RunStore(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace plumbline::storage
