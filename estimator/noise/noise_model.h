@@ -2,12 +2,22 @@
 // fit.
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
 #include <string>
 #include <vector>
 
 #include "estimator/measurement.h"
 
 namespace plumbline {
+
+/// Order of the five terms wherever they form a vector or matrix.
+enum NoiseTermIndex : std::size_t { kTermQ, kTermN, kTermB, kTermK, kTermR, kTermCount };
+inline constexpr const char* kTermName[kTermCount] = {"Q", "N", "B", "K", "R"};
+
+/// The squares of the coefficients, [Q² N² B² K² R²]: every variance is linear in them.
+using NoisePowers = Eigen::Matrix<double, kTermCount, 1>;
+using NoisePowerMatrix = Eigen::Matrix<double, kTermCount, kTermCount>;
 
 /// Coefficient of one noise term with its standard uncertainty.
 struct NoiseTerm {
@@ -34,6 +44,9 @@ struct NoiseModel {
   NoiseTerm K;  ///< acceleration random walk, U/√s: σ² = K²τ/3
   NoiseTerm R;  ///< ramp, U/s:                     σ² = R²τ²/2
   double rate_hz = 0;
+  /// Step of the converter where it is coarser than the noise, U. Then the rounding of a resting
+  /// reading does not average out; 0 when it is buried in the white noise, where N contains it.
+  double rounding_step = 0;
   DeviationCurve oadev;        ///< overlapping Allan deviation of the record
   std::vector<double> fitted;  ///< Allan deviation of the fitted terms at oadev.tau_s
   double chi2 = 0;
@@ -41,6 +54,17 @@ struct NoiseModel {
   double p_value = 1;
   bool adequate = false;  ///< the terms describe the record
   std::string source;     ///< "static record", "bursts at the poses" or "none"
+  std::string remark;     ///< what a person should know: too short, constant, a periodic line …
+
+  /// Correlation of the five coefficients, order Q N B K R; zero rows for terms at zero.
+  NoisePowerMatrix correlation = NoisePowerMatrix::Zero();
+  /// Fisher information of the record about [Q² N² B² K² ·]; what later estimates from other data
+  /// are pooled with. Row and column R are zero: the ramp is a trend, not a variance.
+  NoisePowerMatrix power_information = NoisePowerMatrix::Zero();
 };
+
+/// [Q² N² B² K² R²] as identified. The ramp counts only when it is present: an unproven trend
+/// extrapolated to a longer run would swamp everything else.
+NoisePowers noise_powers(const NoiseModel& model);
 
 }  // namespace plumbline
