@@ -1,0 +1,12 @@
+#include "app/command/command.h"
+
+namespace plumbline::app {
+
+void add_noise(CLI::App& program, Invocation& invocation) {
+  CLI::App* sub = program.add_subcommand("noise", "not yet");
+  sub->callback([&invocation] {
+    invocation.action = []() -> Result<ExitCode> { return fail(ErrorCode::input, "not yet"); };
+  });
+}
+
+}  // namespace plumbline::app

@@ -1,0 +1,90 @@
+// The program `plumbline`: command line in, exit code out. What the commands do is in command/.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "app/command/command.h"
+#include "app/exit_code.h"
+#include "app/provenance.h"
+#include "rig/strict_toml.h"
+
+namespace plumbline::app {
+namespace {
+
+int code(ExitCode exit_code) { return static_cast<int>(exit_code); }
+
+/// Every failure is exactly one line.
+void complain(std::string message) {
+  while (!message.empty() && message.back() == '\n') message.pop_back();
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cout.flush();
+  std::fprintf(stderr, "plumbline: %s\n", message.c_str());
+}
+
+std::string usage_error(const CLI::App& program, const CLI::ParseError& error, int argc,
+                        char** argv) {
+  const std::vector<CLI::App*> parsed = program.get_subcommands();
+  if (!parsed.empty()) {
+    return fmt::format("{}; see plumbline {} --help", error.what(), parsed.front()->get_name());
+  }
+  if (argc < 2) return "no command given; see plumbline --help";
+  std::vector<std::string> known;
+  for (const CLI::App* command : program.get_subcommands({})) known.push_back(command->get_name());
+  const std::string hint = rig::nearest(argv[1], known);
+  return fmt::format("there is no command {}{}; see plumbline --help", argv[1],
+                     hint.empty() ? "" : fmt::format("; did you mean {}?", hint));
+}
+
+int run(int argc, char** argv) {
+  CLI::App program("Calibrates an accelerometer triad on a motorised two-axis dividing head.",
+                   "plumbline");
+  program.set_version_flag("--version", "plumbline " + program_version());
+  program.require_subcommand(1);
+  program.footer(
+      "Exit codes: 0 done, and within the limits if limits were given; 1 done, and limits "
+      "exceeded; "
+      "2 wrong arguments, configuration, input or output; 3 rig or bus fault, stopped safely and "
+      "resumable; 4 internal error.");
+
+  Invocation invocation;
+  add_calibrate(program, invocation);
+  add_evaluate(program, invocation);
+  add_noise(program, invocation);
+  add_help(program, invocation);
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& request) {
+    return program.exit(request);  // --help, --version
+  } catch (const CLI::ParseError& error) {
+    complain(usage_error(program, error, argc, argv));
+    return code(ExitCode::wrong_use);
+  }
+  const Result<ExitCode> outcome = invocation.action();
+  if (outcome) return code(*outcome);
+  complain(outcome.error().message);
+  return code(exit_code_of(outcome.error().code));
+}
+
+}  // namespace
+}  // namespace plumbline::app
+
+int main(int argc, char** argv) {
+  // A full disk and a closed pipe are failures of a write, reported there, not a sudden death.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
+  try {
+    return plumbline::app::run(argc, argv);
+  } catch (const std::exception& error) {
+    plumbline::app::complain(fmt::format("internal error: {}", error.what()));
+  } catch (...) {
+    plumbline::app::complain("internal error");
+  }
+  return plumbline::app::code(plumbline::app::ExitCode::internal_error);
+}
