@@ -34,11 +34,12 @@ std::string usage_error(const CLI::App& program, const CLI::ParseError& error, i
     return fmt::format("{}; see plumbline {} --help", error.what(), parsed.front()->get_name());
   }
   if (argc < 2) return "no command given; see plumbline --help";
+  if (argv[1][0] == '-') return fmt::format("{}; see plumbline --help", error.what());
   std::vector<std::string> known;
   for (const CLI::App* command : program.get_subcommands({})) known.push_back(command->get_name());
   const std::string hint = rig::nearest(argv[1], known);
-  return fmt::format("there is no command {}{}; see plumbline --help", argv[1],
-                     hint.empty() ? "" : fmt::format("; did you mean {}?", hint));
+  return fmt::format("there is no command {}; {}", argv[1],
+                     hint.empty() ? "see plumbline --help" : fmt::format("did you mean {}?", hint));
 }
 
 int run(int argc, char** argv) {
