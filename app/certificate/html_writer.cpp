@@ -1,0 +1,142 @@
+#include <fmt/format.h>
+
+#include "app/certificate/certificate.h"
+#include "app/figure/svg_canvas.h"
+
+namespace plumbline::app {
+namespace {
+
+constexpr const char* kStyle = R"css(
+@page { size: A4; margin: 16mm 15mm 18mm 15mm;
+  @bottom-left { content: "%ID%"; font: 8pt Helvetica, Arial, sans-serif; color: #444; }
+  @bottom-right { content: "page " counter(page) " of " counter(pages);
+                  font: 8pt Helvetica, Arial, sans-serif; color: #444; } }
+* { box-sizing: border-box; }
+body { font: 14px/1.45 Helvetica, Arial, "Liberation Sans", sans-serif; color: #222;
+       max-width: 780px; margin: 32px auto; padding: 0 24px; background: #fff; }
+header { border-bottom: 3px solid #222; padding-bottom: 10px; margin-bottom: 18px; }
+h1 { font-size: 27px; margin: 0; letter-spacing: .01em; }
+header p { margin: 3px 0 0; }
+.id { float: right; font-size: 12px; color: #444; padding-top: 12px; }
+h2 { font-size: 17px; margin: 30px 0 8px; border-bottom: 1px solid #999; padding-bottom: 3px;
+     break-after: avoid; }
+.verdict { border: 1.5px solid #222; border-left-width: 9px; padding: 10px 16px; margin: 16px 0; }
+.verdict strong { font-size: 21px; }
+.verdict p { margin: 5px 0 0; }
+.verdict.plain { border-left-color: #0072b2; }
+.verdict.warning { border-left-color: #d55e00; }
+p.warning { border-left: 5px solid #d55e00; padding-left: 10px; }
+p.note { color: #555; font-size: 13px; }
+table { border-collapse: collapse; width: 100%; margin: 10px 0 16px; font-size: 12.5px;
+        break-inside: avoid; }
+caption { text-align: left; font-weight: bold; padding: 4px 0; }
+th, td { padding: 3px 6px; border-bottom: 1px solid #ddd; text-align: right;
+         font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
+thead th { border-bottom: 1.5px solid #222; vertical-align: bottom; }
+th:first-child, td:first-child, table.words td, table.words th { text-align: left; }
+dl { display: grid; grid-template-columns: 200px 1fr; gap: 3px 14px; margin: 8px 0 14px; }
+dt { color: #444; }
+dd { margin: 0; overflow-wrap: anywhere; }
+.missing { color: #a33; font-style: italic; }
+figure { margin: 16px 0 20px; break-inside: avoid; }
+figure svg { max-width: 100%; height: auto; display: block; }
+figcaption { font-size: 12.5px; color: #444; margin-top: 4px; }
+footer { border-top: 1px solid #999; margin-top: 28px; padding-top: 8px; font-size: 12.5px; }
+.end { text-align: center; letter-spacing: .12em; margin-top: 10px; }
+@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10pt; } }
+)css";
+
+std::string style(const std::string& id) {
+  std::string text = kStyle;
+  // Inside a CSS string, so quotes and backslashes of a serial number must not end it.
+  std::string safe;
+  for (char c : id) {
+    if (c == '"' || c == '\\' || c == '<' || c == '\n') {
+      safe += '_';
+    } else {
+      safe += c;
+    }
+  }
+  return text.replace(text.find("%ID%"), 4, safe);
+}
+
+const char* tone_class(Tone tone) {
+  switch (tone) {
+    case Tone::note:
+      return "note";
+    case Tone::warning:
+      return "warning";
+    case Tone::plain:
+      break;
+  }
+  return "plain";
+}
+
+struct HtmlWriter {
+  std::string text;
+  int figures = 0;
+
+  void operator()(const Heading& heading) {
+    text += fmt::format("<h2>{}</h2>\n", escape_xml(heading.text));
+  }
+  void operator()(const Paragraph& paragraph) {
+    text += fmt::format("<p class=\"{}\">{}</p>\n", tone_class(paragraph.tone),
+                        escape_xml(paragraph.text));
+  }
+  void operator()(const Facts& facts) {
+    text += "<dl>\n";
+    for (const auto& [label, value] : facts.rows) {
+      text += fmt::format("<dt>{}</dt>", escape_xml(label));
+      text += value.empty() ? std::string("<dd class=\"missing\">not stated</dd>\n")
+                            : fmt::format("<dd>{}</dd>\n", escape_xml(value));
+    }
+    text += "</dl>\n";
+  }
+  void operator()(const Table& table) {
+    text += fmt::format("<table>\n<caption>{}</caption>\n<thead><tr>", escape_xml(table.caption));
+    for (const auto& cell : table.header) {
+      text += fmt::format("<th scope=\"col\">{}</th>", escape_xml(cell));
+    }
+    text += "</tr></thead>\n<tbody>\n";
+    for (const auto& row : table.rows) {
+      text += "<tr>";
+      for (const auto& cell : row) text += fmt::format("<td>{}</td>", escape_xml(cell));
+      text += "</tr>\n";
+    }
+    text += "</tbody>\n</table>\n";
+  }
+  void operator()(const Figure& figure) {
+    SvgCanvas canvas(figure.width, figure.height);
+    figure.draw(canvas);
+    text += fmt::format("<figure>\n{}<figcaption>{}</figcaption>\n</figure>\n",
+                        canvas.svg(fmt::format("f{}", ++figures), figure.description),
+                        escape_xml(figure.caption));
+  }
+};
+
+}  // namespace
+
+std::string write_html(const Document& document) {
+  HtmlWriter writer;
+  writer.text = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>{0} {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<header>\n"
+      "<span class=\"id\">{1}</span>\n<h1>{0}</h1>\n<p>{3}</p>\n</header>\n",
+      escape_xml(document.title), escape_xml(document.id), style(document.id),
+      escape_xml(document.subtitle));
+  writer.text += fmt::format("<section class=\"verdict {}\"><strong>{}</strong>\n",
+                             tone_class(document.tone), escape_xml(document.headline));
+  for (const auto& sentence : document.summary) {
+    writer.text += fmt::format("<p>{}</p>\n", escape_xml(sentence));
+  }
+  writer.text += "</section>\n";
+  for (const Block& block : document.blocks) std::visit(writer, block);
+  writer.text += fmt::format(
+      "<footer><p>{}</p><p class=\"end\">— end of certificate {} "
+      "—</p></footer>\n</body>\n</html>\n",
+      escape_xml(document.colophon), escape_xml(document.id));
+  return writer.text;
+}
+
+}  // namespace plumbline::app

@@ -1,0 +1,55 @@
+#include "app/certificate/rounding.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+namespace plumbline::app {
+namespace {
+
+// A typographic minus keeps columns of signed numbers aligned.
+std::string with_minus(std::string text) {
+  if (!text.empty() && text.front() == '-') {
+    const bool zero = text.find_first_not_of("-0.") == std::string::npos;
+    text.replace(0, 1, zero ? "" : "−");
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string significant(double value, int digits) {
+  if (!std::isfinite(value)) return "–";
+  if (value == 0) return "0";
+  const int exponent = static_cast<int>(std::floor(std::log10(std::abs(value))));
+  if (exponent < -5 || exponent >= 7) {
+    const std::string mantissa =
+        with_minus(fmt::format("{:.{}f}", value / std::pow(10.0, exponent), digits - 1));
+    return fmt::format("{}·10^{}", mantissa, exponent);
+  }
+  return with_minus(fmt::format("{:.{}f}", value, std::max(0, digits - 1 - exponent)));
+}
+
+RoundedResult round_result(double value, double expanded) {
+  if (!(expanded > 0) || !std::isfinite(expanded) || !std::isfinite(value)) {
+    return {significant(value, 6), "–"};
+  }
+  int place = static_cast<int>(std::floor(std::log10(expanded))) - 1;
+  double unit = std::pow(10.0, place);
+  double rounded = std::round(expanded / unit) * unit;
+  if (rounded >= 99.5 * unit) {  // 0.0996 becomes 0.10, not 0.100
+    ++place;
+    unit *= 10;
+    rounded = std::round(expanded / unit) * unit;
+  }
+  const int decimals = std::max(0, -place);
+  return {with_minus(fmt::format("{:.{}f}", std::round(value / unit) * unit, decimals)),
+          fmt::format("{:.{}f}", rounded, decimals)};
+}
+
+std::string result_with_unit(double value, double expanded, const std::string& unit) {
+  const RoundedResult rounded = round_result(value, expanded);
+  return fmt::format("({} ± {}) {}", rounded.value, rounded.uncertainty, unit);
+}
+
+}  // namespace plumbline::app
