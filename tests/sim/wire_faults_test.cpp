@@ -79,7 +79,7 @@ TEST(WireFaults, OtherStagesAreLeftAlone) {
 TEST(WireFaults, WrongEntriesAreRefusedByName) {
   EXPECT_THAT(parse("[[faults]]\nkind='modbus.silense'").error().message,
               HasSubstr("modbus.silence"));
-  EXPECT_THAT(parse("[[faults]]\nat_s=1").error().message, HasSubstr("kind"));
+  EXPECT_THAT(parse("[[faults]]\n").error().message, HasSubstr("kind"));
   EXPECT_THAT(parse("[[faults]]\nkind='can.loss'\nat_s=1\nmove=2").error().message,
               HasSubstr("more than one of"));
   EXPECT_THAT(parse("[[faults]]\nkind='can.loss'\nslip_deg=1").error().message,
