@@ -1,0 +1,51 @@
+// One calibration from its inputs to its output folder. Files and stored runs take the same way, so
+// that equal data give equal results; `calibrate`, `run` and `dry-run` end here.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "app/exit_code.h"
+#include "app/provenance.h"
+#include "estimator/calibrate.h"
+#include "storage/run_store.h"
+
+namespace plumbline::app {
+
+/// Everything that a calibration needs, wherever it was read.
+struct CalibrationJob {
+  RunDescription description;
+  MeasurementSet run;
+  SampleTable static_record;    ///< no rows: none
+  MeasurementSet verification;  ///< fresh poses off the grid; no poses: none
+  Provenance provenance;        ///< unit, input hashes, seed
+  std::string source;           ///< what was read, for messages
+};
+
+struct CalibrationFiles {
+  std::filesystem::path samples;
+  std::filesystem::path static_record;  ///< empty: none
+  std::filesystem::path config;
+  bool skip_bad_rows = false;
+};
+
+Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64_t seed);
+/// The run is described by the configuration stored with it.
+Result<CalibrationJob> job_from_database(const std::filesystem::path& database, storage::RunId run,
+                                         std::uint64_t seed);
+
+struct CalibrationOutcome {
+  Calibration calibration;
+  std::optional<Evaluation> verification;
+  ExitCode exit_code = ExitCode::done;  ///< done or limits_exceeded
+  std::string summary;                  ///< for a person; the last line says what came out
+};
+
+/// Calibrates and writes result.json, the certificate and, with verification poses, evaluation.json
+/// into `out`: all of them or, on failure, none. Refuses poses that do not determine the twelve
+/// parameters, naming the unobservable direction.
+Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesystem::path& out);
+
+}  // namespace plumbline::app

@@ -1,0 +1,79 @@
+#include "app/figure/allan_figure.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "app/figure/plot.h"
+#include "app/figure/svg_canvas.h"
+
+namespace plumbline::app {
+
+namespace {
+
+constexpr std::array kColors = {palette::kBlue, palette::kOrange, palette::kGreen};
+constexpr double kMarginLeft = 62, kMarginRight = 14, kMarginTop = 30, kMarginBottom = 42;
+
+/// Whole decades around all positive values; one decade when there is none.
+PlotAxis decades(const std::string& label, const std::vector<double>& values) {
+  double min = std::numeric_limits<double>::infinity();
+  double max = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value) || value <= 0) continue;
+    min = std::min(min, value);
+    max = std::max(max, value);
+  }
+  PlotAxis axis{.label = label, .min = 1, .max = 10, .kind = ScaleKind::logarithmic};
+  if (max == 0) return axis;
+  axis.min = std::pow(10.0, std::floor(std::log10(min)));
+  axis.max = std::pow(10.0, std::ceil(std::log10(max)));
+  if (axis.max <= axis.min) axis.max = 10 * axis.min;
+  return axis;
+}
+
+void append(std::vector<double>& all, const std::vector<double>& some) {
+  all.insert(all.end(), some.begin(), some.end());
+}
+
+}  // namespace
+
+void draw_allan(Canvas& canvas, Point top_left, double width, double height,
+                const std::vector<AllanSeries>& series, const std::string& unit) {
+  std::vector<double> taus;
+  std::vector<double> values;
+  for (const AllanSeries& s : series) {
+    append(taus, s.noise->oadev.tau_s);
+    append(values, s.noise->oadev.value);
+    append(values, s.noise->oadev.lower);
+  }
+  Plot plot(canvas, {top_left.x + kMarginLeft, top_left.y + kMarginTop},
+            width - kMarginLeft - kMarginRight, height - kMarginTop - kMarginBottom,
+            decades("averaging time τ, s", taus),
+            decades("overlapping Allan deviation, " + unit, values));
+  plot.draw_frame();
+  std::vector<LegendEntry> legend;
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    const NoiseModel& noise = *series[i].noise;
+    const std::string color = kColors[i % kColors.size()];
+    plot.band(noise.oadev.tau_s, noise.oadev.lower, noise.oadev.upper, color, 0.2);
+    plot.points(noise.oadev.tau_s, noise.oadev.value, 2, color);
+    const Stroke dashed{color, 1.2, {5, 3}};
+    if (noise.fitted.size() == noise.oadev.tau_s.size()) {
+      plot.line(noise.oadev.tau_s, noise.fitted, dashed);
+    }
+    legend.push_back({series[i].label, {}, color});
+  }
+  legend.push_back({"sum of the fitted terms", {palette::kBlack, 1.2, {5, 3}}, {}});
+  draw_legend(canvas, {top_left.x + kMarginLeft, top_left.y + 18}, legend);
+}
+
+std::string allan_svg(const std::vector<AllanSeries>& series, const std::string& unit) {
+  constexpr double kWidth = 720, kHeight = 480;
+  SvgCanvas canvas(kWidth, kHeight);
+  canvas.rectangle({0, 0}, kWidth, kHeight, "#ffffff");
+  draw_allan(canvas, {0, 0}, kWidth, kHeight, series, unit);
+  return canvas.svg("allan", "Overlapping Allan deviation against averaging time");
+}
+
+}  // namespace plumbline::app

@@ -1,0 +1,29 @@
+// noise.json (schema "plumbline.noise/1", app/io/schema/noise.schema.json).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/io/json.h"
+#include "app/provenance.h"
+#include "estimator/noise/noise_model.h"
+
+namespace plumbline::app {
+
+/// One identified channel.
+struct NoiseChannel {
+  std::string axis;    ///< "x", "y" or "z"
+  std::string column;  ///< of the file
+  std::string unit;    ///< of the record after scaling
+  NoiseModel noise;
+};
+
+struct NoiseReport {
+  double rate_hz = 0;
+  std::size_t samples = 0;
+  std::vector<NoiseChannel> channels;
+};
+
+Json noise_json(const NoiseReport& report, const Provenance& provenance);
+
+}  // namespace plumbline::app

@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "app/io/read_file.h"
+#include "app/io/result_json.h"
+
+namespace plumbline::app {
+
+namespace {
+
+std::size_t axis_named(const Json& name) {
+  const auto text = name.get<std::string>();
+  const auto it = std::find(kAxisName.begin(), kAxisName.end(), text);
+  if (it == kAxisName.end()) throw std::invalid_argument("there is no axis \"" + text + "\"");
+  return static_cast<std::size_t>(it - kAxisName.begin());
+}
+
+AxisEstimate axis_estimate(const Json& json) {
+  AxisEstimate estimate;
+  for (std::size_t i = 0; i < 3; ++i) {
+    estimate.value[static_cast<Eigen::Index>(i)] = json.at("K_V_per_g").at(i).get<double>();
+  }
+  estimate.value[3] = json.at("U0_V").get<double>();
+  for (std::size_t row = 0; row < 4; ++row) {
+    for (std::size_t column = 0; column < 4; ++column) {
+      estimate.covariance(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) =
+          json.at("covariance").at(row).at(column).get<double>();
+    }
+  }
+  return estimate;
+}
+
+TriadEstimate triad_estimate(const Json& json) {
+  TriadEstimate triad;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    triad[axis] = axis_estimate(json.at(kAxisName[axis]));
+    const auto diagonal = static_cast<Eigen::Index>(axis);
+    if (triad[axis].value[diagonal] == 0) {
+      throw std::invalid_argument(fmt::format("the scale factor of axis {} is 0", kAxisName[axis]));
+    }
+  }
+  return triad;
+}
+
+FoundEffect found_effect(const Json& json) {
+  FoundEffect effect;
+  effect.id = json.at("id").get<std::string>();
+  for (const Json& axis : json.at("axes")) effect.axes.push_back(axis_named(axis));
+  for (const Json& item : json.at("parameters")) {
+    EffectParameter parameter;
+    parameter.name = item.at("name").get<std::string>();
+    if (!item.at("axis").is_null()) parameter.axis = axis_named(item.at("axis"));
+    parameter.value = item.at("value").get<double>();
+    parameter.u = item.at("u").get<double>();
+    parameter.unit = item.at("unit").get<std::string>();
+    effect.parameters.push_back(std::move(parameter));
+  }
+  return effect;
+}
+
+StoredCalibration stored_calibration(const Json& json) {
+  if (const auto schema = json.at("schema").get<std::string>(); schema != "plumbline.result/1") {
+    throw std::invalid_argument(
+        fmt::format("its schema is \"{}\" instead of \"plumbline.result/1\"", schema));
+  }
+  StoredCalibration stored;
+  stored.model.twelve = triad_estimate(json.at("estimates").at("batch_ls"));
+  stored.model.final = triad_estimate(json.at("final").at("batch_ls"));
+  for (const Json& effect : json.at("diagnosis").at("effects")) {
+    stored.model.effects.push_back(found_effect(effect));
+  }
+  const Json& dut = json.at("provenance").at("dut");
+  stored.dut.serial = dut.at("serial").get<std::string>();
+  stored.dut.model = dut.at("model").get<std::string>();
+  return stored;
+}
+
+}  // namespace
+
+Result<StoredCalibration> parse_result_json(std::string_view text, const std::string& name) {
+  try {
+    return stored_calibration(Json::parse(text));
+  } catch (const std::exception& error) {
+    return fail(ErrorCode::input,
+                fmt::format("{}: not a usable result.json: {}", name, error.what()));
+  }
+}
+
+Result<StoredCalibration> read_result_json(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return parse_result_json(*text, path.string());
+}
+
+}  // namespace plumbline::app

@@ -1,0 +1,184 @@
+#include "app/summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/certificate/rounding.h"
+
+namespace plumbline::app {
+
+namespace {
+
+constexpr double kCoverageFactor = 2;
+constexpr double kMilli = 1e3;
+
+std::string unit_name(const RunDescription& description) {
+  return description.dut.serial.empty() ? "The unit" : "Unit " + description.dut.serial;
+}
+
+std::string counted(std::size_t count, const char* singular) {
+  return fmt::format("{} {}{}", count, singular, count == 1 ? "" : "s");
+}
+
+/// Pads by what is seen: "±" and "²" are two bytes and one column.
+std::string right_aligned(const std::string& text, std::size_t width) {
+  const auto columns = static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xC0) != 0x80; }));
+  return columns >= width ? text : std::string(width - columns, ' ') + text;
+}
+
+std::string parameter_rows(const TriadEstimate& estimate) {
+  std::string rows = "parameters, ± with k = 2:";
+  for (const char* title : {"K_x mV/g", "K_y mV/g", "K_z mV/g", "U_0 mV"}) {
+    rows += right_aligned(title, rows.size() < 30 ? 20 : 23);
+  }
+  rows += '\n';
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    rows += fmt::format("  {}    ", kAxisName[axis]);
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      const double u = std::sqrt(std::max(0.0, estimate[axis].covariance(i, i)));
+      const RoundedResult rounded =
+          round_result(kMilli * estimate[axis].value[i], kMilli * kCoverageFactor * u);
+      rows += right_aligned(rounded.value + " ± " + rounded.uncertainty, i == 0 ? 38 : 23);
+    }
+    rows += '\n';
+  }
+  return rows;
+}
+
+std::string error_row(const char* label, const PerAxis<double>& values) {
+  std::string row = fmt::format("  {:<44}", label);
+  for (const double value : values) row += right_aligned(significant(kMilli * value, 3), 9);
+  return row + '\n';
+}
+
+std::string error_header() {
+  return fmt::format("{:<46}{:>9}{:>9}{:>9}\n", "error of a pose mean, mm/s² rms:", "x", "y", "z");
+}
+
+std::string error_rows(const Calibration& calibration,
+                       const std::optional<Evaluation>& verification) {
+  std::string rows = error_header();
+  rows += error_row("twelve parameters, poses left out of the fit",
+                    calibration.before.heldout_pose_rms_mps2);
+  if (!calibration.diagnosis.effects.empty()) {
+    rows += error_row("with the added effects, poses left out",
+                      calibration.after.heldout_pose_rms_mps2);
+  }
+  rows += error_row("what the noise alone would leave", calibration.floor_pose_rms_mps2);
+  if (verification) {
+    rows += error_row(
+        fmt::format("{} off the grid", counted(verification->poses, "fresh pose")).c_str(),
+        verification->after.pose_rms_mps2);
+  }
+  return rows;
+}
+
+std::string decision_words(const Decision& decision) {
+  switch (decision.status) {
+    case DecisionStatus::pass:
+      return "PASS";
+    case DecisionStatus::conditional_pass:
+      return "CONDITIONAL PASS";
+    case DecisionStatus::conditional_fail:
+      return "CONDITIONAL FAIL";
+    case DecisionStatus::fail:
+      return "FAIL";
+    case DecisionStatus::none:
+      break;
+  }
+  return "no limit given";
+}
+
+/// The axis whose residual stands out most against the floor.
+std::size_t worst_axis(const Calibration& calibration) {
+  const auto ratio = [&](std::size_t axis) {
+    return calibration.after.heldout_pose_rms_mps2[axis] /
+           std::max(1e-300, calibration.floor_pose_rms_mps2[axis]);
+  };
+  std::size_t worst = 0;
+  for (std::size_t axis = 1; axis < kAxisCount; ++axis) {
+    if (ratio(axis) > ratio(worst)) worst = axis;
+  }
+  return worst;
+}
+
+std::string verdict_words(const Calibration& calibration) {
+  const std::size_t axis = worst_axis(calibration);
+  const std::string residual =
+      fmt::format("{} axis: {} m/s² rms where the noise alone would leave {}", kAxisName[axis],
+                  significant(calibration.after.heldout_pose_rms_mps2[axis], 2),
+                  significant(calibration.floor_pose_rms_mps2[axis], 2));
+  switch (calibration.diagnosis.verdict) {
+    case Verdict::clean:
+      return fmt::format("is calibrated and the model is complete within the noise ({})", residual);
+    case Verdict::explained:
+      return fmt::format("is calibrated, its residual is explained ({})", residual);
+    case Verdict::partly_explained:
+      return fmt::format("is calibrated, but its residual is explained only in part ({})",
+                         residual);
+    case Verdict::unexplained:
+      return fmt::format("is calibrated, but the model lacks something ({})", residual);
+    case Verdict::undetermined:
+      break;
+  }
+  return fmt::format("is calibrated; whether the model is complete cannot be told ({})",
+                     calibration.diagnosis.reason);
+}
+
+}  // namespace
+
+std::string conclusion(const RunDescription& description, const Calibration& calibration,
+                       const std::optional<Evaluation>& verification) {
+  std::string text = unit_name(description) + " " + verdict_words(calibration);
+  if (verification) {
+    const auto& errors = verification->after.pose_max_abs_mps2;
+    text += fmt::format("; {} confirm it to {} m/s²", counted(verification->poses, "fresh pose"),
+                        significant(*std::max_element(errors.begin(), errors.end()), 2));
+  }
+  const Decision& decision = calibration.decision;
+  if (decision.status != DecisionStatus::none) {
+    text += fmt::format("; {}: largest error {} m/s², limit {} m/s²", decision_words(decision),
+                        significant(decision.max_abs_error_mps2, 2),
+                        significant(decision.limit_mps2, 3));
+  }
+  return text + ".";
+}
+
+std::string summary(const RunDescription& description, const Calibration& calibration,
+                    const std::optional<Evaluation>& verification) {
+  std::string text =
+      fmt::format("{}: {}, {}{}; noise from the {}\n", unit_name(description),
+                  counted(calibration.poses, "pose"), counted(calibration.samples, "sample"),
+                  calibration.skipped_rows == 0
+                      ? ""
+                      : fmt::format(", {} skipped", counted(calibration.skipped_rows, "bad row")),
+                  calibration.noise[0].source);
+  text += parameter_rows(calibration.final.batch_ls);
+  text += error_rows(calibration, verification);
+  text += fmt::format("diagnosis: {}: {}\n", to_string(calibration.diagnosis.verdict),
+                      calibration.diagnosis.reason);
+  text += fmt::format("decision: {}\n", decision_words(calibration.decision));
+  return text + conclusion(description, calibration, verification) + "\n";
+}
+
+std::string evaluation_summary(const Evaluation& evaluation, const std::optional<Limits>& limits) {
+  std::string text = error_header();
+  text += error_row("twelve parameters", evaluation.before.pose_rms_mps2);
+  text += error_row("certified model", evaluation.after.pose_rms_mps2);
+  text += error_row("certified model, largest", evaluation.after.pose_max_abs_mps2);
+  const auto& errors = evaluation.after.pose_max_abs_mps2;
+  const double largest = *std::max_element(errors.begin(), errors.end());
+  text += fmt::format("The calibration reproduces {} to {} m/s² at worst",
+                      counted(evaluation.poses, "pose"), significant(largest, 2));
+  if (limits) {
+    text +=
+        fmt::format("; {}: limit {} m/s²", largest <= limits->max_abs_error_mps2 ? "PASS" : "FAIL",
+                    significant(limits->max_abs_error_mps2, 3));
+  }
+  return text + ".\n";
+}
+
+}  // namespace plumbline::app
