@@ -49,12 +49,14 @@ FaultStage stage_of(FaultKind kind);
 /// duration_s has passed or it has acted `count` times.
 struct Fault {
   FaultKind kind = FaultKind::modbus_silence;
-  std::optional<double> at_s;         ///< world time
-  std::optional<std::int64_t> after;  ///< number of events (see FaultKind) that still go well
-  std::optional<std::int64_t> move;   ///< start of the k-th motion of the head, counted from 0
-  double delay_s = 0;                 ///< world time
-  double duration_s = 0;              ///< world time; 0 = without end
-  std::int64_t count = 1;             ///< 0 = without bound
+  std::optional<double> at_s = std::nullopt;  ///< world time
+  std::optional<std::int64_t> after =
+      std::nullopt;  ///< number of events (see FaultKind) that still go well
+  std::optional<std::int64_t> move =
+      std::nullopt;        ///< start of the k-th motion of the head, counted from 0
+  double delay_s = 0;      ///< world time
+  double duration_s = 0;   ///< world time; 0 = without end
+  std::int64_t count = 1;  ///< 0 = without bound
   double probability = 1;
   int axis = 0;      ///< drive faults: 0 δ, 1 h; node faults: 0 x, 1 y, 2 z
   double value = 0;  ///< exception or alarm code, delay, angle … by kind

@@ -1,0 +1,31 @@
+#include "rig/sim/ready_file.h"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <system_error>
+
+namespace plumbline::sim {
+
+Result<void> write_ready_file(const std::filesystem::path& path, const std::string& modbus,
+                              const std::string& can) {
+  std::filesystem::path draft = path;
+  draft += fmt::format(".{}", ::getpid());
+  std::ofstream file(draft);
+  file << toml::table{{"modbus", modbus}, {"can", can}} << '\n';
+  file.close();
+  std::error_code error;
+  if (file) {
+    std::filesystem::rename(draft, path, error);
+    if (!error) return {};
+  }
+  std::error_code ignored;
+  std::filesystem::remove(draft, ignored);
+  return fail(ErrorCode::output,
+              fmt::format("{}: the ready file cannot be written; is its folder there and writable?",
+                          path.string()));
+}
+
+}  // namespace plumbline::sim
