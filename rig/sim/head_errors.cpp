@@ -35,8 +35,8 @@ Attitude attitude(const HeadErrors& e, double delta_deg, double h_deg, int appro
                    harmonic(e.h_eccentricity_c_deg, e.h_eccentricity_s_deg, h_deg);
 
   // The moving parts, as columns in base coordinates. The sensor starts at δ = h = 0 with x_s up,
-  // y_s = −y_b and z_s along the spindle; it turns about the spindle, the spindle leans by the skew,
-  // the tilt axis −y_b raises all of it.
+  // y_s = −y_b and z_s along the spindle; it turns about the spindle, the spindle leans by the
+  // skew, the tilt axis −y_b raises all of it.
   Matrix3d sensor;
   sensor.col(0) = Vector3d::UnitZ();
   sensor.col(1) = -Vector3d::UnitY();
@@ -45,8 +45,8 @@ Attitude attitude(const HeadErrors& e, double delta_deg, double h_deg, int appro
                                   turn(e.axis_skew_deg, Vector3d::UnitZ()) *
                                   turn(delta, Vector3d::UnitX()) * sensor;
   // The base in level coordinates: pitch about −y of the level frame, then roll about its own x_b.
-  const Matrix3d base = turn(e.base_pitch_deg, -Vector3d::UnitY()) *
-                        turn(e.base_roll_deg, Vector3d::UnitX());
+  const Matrix3d base =
+      turn(e.base_pitch_deg, -Vector3d::UnitY()) * turn(e.base_roll_deg, Vector3d::UnitX());
 
   const Vector3d up = sensor_in_base.transpose() * (base.transpose() * Vector3d::UnitZ());
   const Vector3d x = sensor_in_base.transpose() * Vector3d::UnitX();

@@ -14,9 +14,9 @@ struct HeadErrors {
   double base_roll_deg = 0;  ///< base turned right-handed about x_b
   double base_pitch_deg =
       0;  ///< base turned about −y_b: raises the spindle as a tilt index error does
-  double axis_skew_deg = 0;  ///< spindle turned out of the perpendicular to the tilt axis,
-                             ///< right-handed about the upright axis that tilts with h
-  double delta_index_deg = 0;           ///< constant error of δ
+  double axis_skew_deg = 0;    ///< spindle turned out of the perpendicular to the tilt axis,
+                               ///< right-handed about the upright axis that tilts with h
+  double delta_index_deg = 0;  ///< constant error of δ
   double delta_eccentricity_c_deg = 0;  ///< δ += c·cos δ + s·sin δ
   double delta_eccentricity_s_deg = 0;
   double delta_ellipticity_c_deg = 0;  ///< δ += c·cos 2δ + s·sin 2δ

@@ -4,9 +4,7 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <memory>
-#include <string>
 
 #include "rig/sim/axis.h"
 
@@ -32,16 +30,37 @@ struct NodeSample {
   double motor_A = 0;
 };
 
-/// Produces one sample after another at the node's rate. Everything random comes from the seed and
-/// the sample counter alone, so the same motion gives the same codes.
+/// What really was at the instant of a sample; for tests and for studies with known truth.
+struct SampleTruth {
+  double delta_deg = 0;  ///< angles of the drives, without the errors of the head
+  double h_deg = 0;
+  std::array<double, 3> a_g{};          ///< specific force in the sensor frame
+  std::array<double, 3> noiseless_V{};  ///< output, effects included
+  std::array<std::int32_t, 3> code{};   ///< as sent
+  std::array<std::int32_t, 3>
+      plain_code{};   ///< same unit, head and noise without any of [[effects]]
+  double temp_C = 0;  ///< of the sensor
+  long long pose = 0;
+};
+
+/// Produces one sample after another at the node's rate. Everything random comes from the seed
+/// alone, each source from a stream of its own: the same motion gives the same codes.
 class Unit {
  public:
   Unit(const World& world, std::uint64_t seed);
   ~Unit();
   Unit(Unit&&) noexcept;
+  Unit& operator=(Unit&&) noexcept;
   /// The sample with the next counter; `head` is the head at next_time_s().
   NodeSample next(const HeadState& head);
   double next_time_s() const;
+
+  /// For recording without wires: samples are left out until the clock is at or past t_s, and the
+  /// head then stands at the pose with this number. Noise, room and effects live through the gap;
+  /// a motion current flows during it.
+  void jump_to_pose(double t_s, double delta_deg, double h_deg, long long pose);
+  /// Of the sample returned last.
+  const SampleTruth& truth() const;
 
  private:
   struct Impl;

@@ -24,7 +24,8 @@ void read_unit(StrictTable table, World& world) {
   world.serial = table.text_or("serial", world.serial);
   world.model = table.text_or("model", world.model);
   world.scatter.random = table.flag_or("random", false);
-  world.scatter.scale_rel = table.number_or("scatter_scale_rel", world.scatter.scale_rel, kNotNegative);
+  world.scatter.scale_rel =
+      table.number_or("scatter_scale_rel", world.scatter.scale_rel, kNotNegative);
   world.scatter.cross_V_per_g =
       table.number_or("scatter_cross_V_per_g", world.scatter.cross_V_per_g, kNotNegative);
   world.scatter.bias_V = table.number_or("scatter_bias_V", world.scatter.bias_V, kNotNegative);
@@ -56,8 +57,10 @@ void read_noise_terms(StrictTable table, double volts_per_g, NoiseTerms& terms) 
   const std::string unit = table.choice_or("unit", "V", {"V", "g"});
   const double factor = unit == "g" ? volts_per_g : 1.0;
   const auto read = [&](const char* key, double& value) {
-    if (table.has(key)) value = factor * table.number(key, kNotNegative);
-    else table.number_or(key, 0);
+    if (table.has(key))
+      value = factor * table.number(key, kNotNegative);
+    else
+      table.number_or(key, 0);
   };
   read("Q", terms.Q);
   read("N", terms.N);
@@ -111,26 +114,6 @@ void read_room(StrictTable table, Room& room) {
   size("motor_noise_A", room.motor_noise_A);
 }
 
-void read_axis(StrictTable table, AxisDynamics& axis) {
-  axis.speed_deg_s = table.number_or("speed_deg_s", axis.speed_deg_s, kPositive);
-  axis.acceleration_deg_s2 =
-      table.number_or("acceleration_deg_s2", axis.acceleration_deg_s2, kPositive);
-  axis.overshoot_deg = table.number_or("overshoot_deg", axis.overshoot_deg);
-  axis.settling_hz = table.number_or("settling_hz", axis.settling_hz, kPositive);
-  axis.settling_tau_s = table.number_or("settling_tau_s", axis.settling_tau_s, kPositive);
-  axis.encoder_resolution_deg =
-      table.number_or("encoder_resolution_deg", axis.encoder_resolution_deg, kPositive);
-  axis.in_position_window_deg =
-      table.number_or("in_position_window_deg", axis.in_position_window_deg, kPositive);
-  axis.in_position_hold_s = table.number_or("in_position_hold_s", axis.in_position_hold_s, kNotNegative);
-  axis.lower_limit_deg = table.number_or("lower_limit_deg", axis.lower_limit_deg);
-  axis.upper_limit_deg = table.number_or("upper_limit_deg", axis.upper_limit_deg);
-  axis.home_offset_deg = table.number_or("home_offset_deg", axis.home_offset_deg);
-  if (!(axis.lower_limit_deg < axis.upper_limit_deg)) {
-    table.refuse("upper_limit_deg", "must be above lower_limit_deg");
-  }
-}
-
 void read_head(StrictTable table, World& world) {
   const auto read = [&](const char* key, double& value) { value = table.number_or(key, 0); };
   HeadErrors& head = world.head;
@@ -147,8 +130,8 @@ void read_head(StrictTable table, World& world) {
   read("h_eccentricity_c_deg", head.h_eccentricity_c_deg);
   read("h_eccentricity_s_deg", head.h_eccentricity_s_deg);
   read("backlash_deg", head.backlash_deg);
-  world.scatter_of_head.delta_arcsec = table.number_or("scatter_delta_arcsec", 0, kNotNegative);
-  world.scatter_of_head.h_arcsec = table.number_or("scatter_h_arcsec", 0, kNotNegative);
+  world.positioning.delta_arcsec = table.number_or("scatter_delta_arcsec", 0, kNotNegative);
+  world.positioning.h_arcsec = table.number_or("scatter_h_arcsec", 0, kNotNegative);
 }
 
 std::vector<std::size_t> read_axes(StrictTable& table) {
@@ -172,8 +155,9 @@ EffectSetting read_effect(StrictTable table) {
     std::vector<std::string> known;
     for (const EffectInfo* effect : effect_catalogue()) known.emplace_back(effect->id);
     const std::string hint = rig::nearest(setting.id, known);
-    table.refuse("id", fmt::format("there is no effect \"{}\"{}", setting.id,
-                                   hint.empty() ? "" : fmt::format("; did you mean \"{}\"?", hint)));
+    table.refuse("id",
+                 fmt::format("there is no effect \"{}\"{}", setting.id,
+                             hint.empty() ? "" : fmt::format("; did you mean \"{}\"?", hint)));
     return setting;
   }
   setting.axes = {0, 1, 2};
@@ -208,11 +192,10 @@ Result<World> read(rig::StrictFile& file, const std::string& name) {
   world.reference_C = root.table("temperature").number_or("reference_C", world.reference_C);
   read_noise(root.table("noise"), world);
   read_room(root.table("room"), world.room);
-  StrictTable drive = root.table("drive");
-  read_axis(drive.table("delta"), world.delta);
-  read_axis(drive.table("h"), world.h);
+  world.drive = read_drive(root.table("drive"));
   read_head(root.table("head"), world);
   for (StrictTable& table : root.tables("effects")) world.effects.push_back(read_effect(table));
+  world.faults = read_faults(root);
   if (auto done = file.finish(); !done) return fail(done.error());
   return world;
 }

@@ -13,7 +13,8 @@
 #include <vector>
 
 #include "estimator/measurement.h"
-#include "rig/sim/axis.h"
+#include "rig/sim/drive_settings.h"
+#include "rig/sim/faults.h"
 #include "rig/sim/head_errors.h"
 
 namespace plumbline::sim {
@@ -40,7 +41,8 @@ struct UnitScatter {
 struct NoiseTerms {
   double Q = 0;  ///< quantization noise, V·s
   double N = 0;  ///< velocity random walk, V·√s: standard deviation N·√rate per sample
-  double B = 0;  ///< bias instability, V: PSD (B²/2π)/f between kFlickerLowest_hz and rate/4
+  double B =
+      0;  ///< bias instability, V: PSD (B²/2π)/f between kFlickerLowest_hz (noise.h) and rate/4
   double K = 0;  ///< acceleration random walk, V/√s
   double R = 0;  ///< ramp, V/s: a straight line of slope ±R, sign drawn from the seed
 };
@@ -112,12 +114,12 @@ struct World {
   PerAxis<NoiseTerms> noise_V;
   Room room;
 
-  AxisDynamics delta;                                             ///< [drive.delta]
-  AxisDynamics h{.lower_limit_deg = -95, .upper_limit_deg = 95};  ///< [drive.h]
+  DriveSettings drive;
   HeadErrors head;  ///< geometric errors that every run has, effects or not
-  PositioningScatter scatter_of_head;
+  PositioningScatter positioning;
 
   std::vector<EffectSetting> effects;
+  Faults faults;
 };
 
 /// Reads a world file. Noise tables [noise] (all axes) and [noise.x], [noise.y], [noise.z] take

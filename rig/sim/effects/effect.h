@@ -2,7 +2,8 @@
 //
 // An effect overrides those stages of the signal path that it disturbs. The path of one sample:
 //
-//   head errors ─► gravity in the sensor frame ─► response K·a + U0 ─► + K_ii·[input-referred terms]
+//   head errors ─► gravity in the sensor frame ─► response K·a + U0 ─► + K_ii·[input-referred
+//   terms]
 //     bend_head()                                                        sensor()
 //   ─► + noise · factor ─► converter input ─► code
 //        noise_factor()    convert()          encode()
@@ -21,7 +22,8 @@
 
 namespace plumbline::sim {
 
-/// What an effect may look at, at the instant of one sample (or between samples, while time passes).
+/// What an effect may look at, at the instant of one sample (or between samples, while time
+/// passes).
 struct Moment {
   double t_s = 0;
   double dt_s = 0;  ///< since the previous instant
@@ -31,17 +33,18 @@ struct Moment {
   double delta_speed_deg_s = 0;
   double h_speed_deg_s = 0;
   bool moving = false;
-  int approach = 0;            ///< direction of the last δ motion: −1, +1, 0 before the first
-  long long pose = 0;          ///< counts the arrivals at rest; 0 is where the head stands first
-  double t_in_pose_s = 0;      ///< since the arrival
-  PerAxis<double> a_previous;  ///< nominal specific force at the previous pose, g; first pose: its own
-  PerAxis<double> a_nominal;   ///< nominal specific force at the angles above, g
+  int approach = 0;        ///< direction of the last δ motion: −1, +1, 0 before the first
+  long long pose = 0;      ///< counts the arrivals at rest; 0 is where the head stands first
+  double t_in_pose_s = 0;  ///< since the arrival
+  PerAxis<double>
+      a_previous;  ///< nominal specific force at the previous pose, g; first pose: its own
+  PerAxis<double> a_nominal;  ///< nominal specific force at the angles above, g
 
-  Attitude attitude;   ///< with all head errors; filled in after bend_head()
-  PerAxis<double> a;   ///< true specific force in the sensor frame, g; likewise
+  Attitude attitude;  ///< with all head errors; filled in after bend_head()
+  PerAxis<double> a;  ///< true specific force in the sensor frame, g; likewise
 
-  double air_C = 0;     ///< of the room
-  double temp_C = 0;    ///< of the sensor
+  double air_C = 0;   ///< of the room
+  double temp_C = 0;  ///< of the sensor
   double rh_pct = 0;
   double supply_V = 0;
   double motor_A = 0;

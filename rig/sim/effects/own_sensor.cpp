@@ -1,0 +1,162 @@
+// Effects of the sensor that are on no list: a calibration has to find them by their shape.
+#include <cmath>
+
+#include "rig/sim/effects/effect.h"
+#include "rig/sim/effects/terms.h"
+
+namespace plumbline::sim {
+
+namespace {
+
+/// Glue of the proof mass's frame: expands with temperature through a play, so that the bias on the
+/// way up differs from the bias on the way down.
+class ThermalHysteresis final : public Effect {
+ public:
+  explicit ThermalHysteresis(const EffectContext& p)
+      : mask_(axis_mask(p.setting)), b_(p("b")), play_(p("width") / 2) {}
+  void observe(const Moment& now) override { offset_C_ = play_.next(now.temp_C) - now.temp_C; }
+  double sensor_g(const Moment&, std::size_t axis) override {
+    return mask_[axis] ? b_ * offset_C_ : 0.0;
+  }
+
+ private:
+  std::array<bool, 3> mask_;
+  double b_;
+  Play play_;
+  double offset_C_ = 0;
+};
+
+/// A housing that heats up from outside: while its temperature changes, a gradient bends it.
+class ThermalGradient final : public Effect {
+ public:
+  explicit ThermalGradient(const EffectContext& p)
+      : mask_(axis_mask(p.setting)), b_(p("b")), core_(p("tau")) {}
+  void observe(const Moment& now) override {
+    gradient_C_ = now.temp_C - core_.next(now.temp_C, now.dt_s);
+  }
+  double sensor_g(const Moment&, std::size_t axis) override {
+    return mask_[axis] ? b_ * gradient_C_ : 0.0;
+  }
+
+ private:
+  std::array<bool, 3> mask_;
+  double b_;
+  Lag core_;
+  double gradient_C_ = 0;
+};
+
+/// Suspension that remembers the load of the last minutes: every earlier pose counts, the longer
+/// ago the less.
+class Creep final : public Effect {
+ public:
+  explicit Creep(const EffectContext& p)
+      : mask_(axis_mask(p.setting)),
+        c_(p("c")),
+        memory_{Lag(p("tau")), Lag(p("tau")), Lag(p("tau"))} {}
+  void observe(const Moment& now) override {
+    // Between two poses the head has spent about the time of the step at the earlier one.
+    const PerAxis<double>& load = now.moving ? now.a_previous : now.a_nominal;
+    for (std::size_t i = 0; i < kAxisCount; ++i) memory_[i].next(load[i], now.dt_s);
+  }
+  double sensor_g(const Moment& now, std::size_t axis) override {
+    return mask_[axis] ? c_ * (memory_[axis].value() - now.a_nominal[axis]) : 0.0;
+  }
+
+ private:
+  std::array<bool, 3> mask_;
+  double c_;
+  std::array<Lag, 3> memory_;
+};
+
+/// A proof mass that sticks: it follows the force only when the change exceeds its friction.
+class Stiction final : public Effect {
+ public:
+  explicit Stiction(const EffectContext& p)
+      : mask_(axis_mask(p.setting)),
+        position_{Play(p("friction")), Play(p("friction")), Play(p("friction"))} {}
+  void observe(const Moment& now) override {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      remainder_[i] = position_[i].next(now.a_nominal[i]) - now.a_nominal[i];
+    }
+  }
+  double sensor_g(const Moment&, std::size_t axis) override {
+    return mask_[axis] ? remainder_[axis] : 0.0;
+  }
+
+ private:
+  std::array<bool, 3> mask_;
+  std::array<Play, 3> position_;
+  PerAxis<double> remainder_{};
+};
+
+/// Axes whose directions move with temperature: the output takes up the next axis, x ← y ← z ← x.
+std::unique_ptr<Effect> thermal_twist(const EffectContext& p) {
+  return sensor_term(p, [c = p("c"), t0 = p.world.reference_C](const Moment& now, std::size_t i) {
+    return c * (now.temp_C - t0) * now.a[(i + 1) % kAxisCount];
+  });
+}
+
+/// Warm gas inside the case rises: how it cools the sensor depends on which way is up.
+std::unique_ptr<Effect> chimney(const EffectContext& p) {
+  return sensor_term(p, [b = p("b")](const Moment& now, std::size_t) {
+    return b * (now.temp_C - now.air_C) * now.a[0] * now.a[2];
+  });
+}
+
+const ParameterInfo kTau{.name = "tau", .unit = "s", .min = 1e-6};
+
+template <class T>
+std::unique_ptr<Effect> make(const EffectContext& p) {
+  return std::make_unique<T>(p);
+}
+
+const EffectInfo kEffects[] = {
+    {"own.thermal_hysteresis",
+     "b*(play(T) - T), play of the given width",
+     "temp_C",
+     "bias",
+     true,
+     {{"b", "g/K"}, {.name = "width", .unit = "K", .min = 0}},
+     make<ThermalHysteresis>},
+    {"own.thermal_gradient",
+     "b*(T - T lagged by tau)",
+     "temp_C.rate",
+     "bias",
+     true,
+     {{"b", "g/K"}, kTau},
+     make<ThermalGradient>},
+    {"own.creep",
+     "c*(a_i lagged by tau - a_i)",
+     "previous_pose",
+     "bias",
+     true,
+     {{"c", "1"}, kTau},
+     make<Creep>},
+    {"own.stiction",
+     "play(a_i) - a_i, half width friction",
+     "previous_pose",
+     "bias",
+     true,
+     {{.name = "friction", .unit = "g", .min = 0}},
+     make<Stiction>},
+    {"own.thermal_twist",
+     "c*(T-T0)*a_(i+1), axes counted cyclically",
+     "temp_C",
+     "scale",
+     true,
+     {{"c", "1/K"}},
+     thermal_twist},
+    {"own.chimney",
+     "b*(T - T of the air)*a_x*a_z",
+     "temp_C",
+     "scale",
+     true,
+     {{"b", "g/K"}},
+     chimney},
+};
+
+}  // namespace
+
+std::span<const EffectInfo> own_sensor_effects() { return kEffects; }
+
+}  // namespace plumbline::sim

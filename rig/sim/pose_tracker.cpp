@@ -1,0 +1,58 @@
+#include "rig/sim/pose_tracker.h"
+
+#include <cmath>
+
+namespace plumbline::sim {
+
+namespace {
+
+/// Settling and encoder steps move a resting axis by less than this.
+constexpr double kMotion_deg = 0.1;
+
+int direction(double travel_deg) {
+  if (std::abs(travel_deg) < kMotion_deg) return 0;
+  return travel_deg > 0 ? 1 : -1;
+}
+
+}  // namespace
+
+void PoseTracker::observe(double t_s, const HeadState& head) {
+  const Angles here{head.delta.angle_deg, head.h.angle_deg};
+  if (!started_) {
+    started_ = true;
+    rest_ = previous_ = here;
+    arrival_s_ = t_s;
+  }
+  const bool moving = head.delta.moving || head.h.moving;
+  if (moving && !moving_) {
+    if (t_s - arrival_s_ >= kShortestPose_s) {
+      previous_ = rest_;
+      ++pose_;
+    }
+    moving_ = true;
+  }
+  const bool arrived = head.delta.in_position && head.h.in_position;
+  if (moving_ && !moving && arrived) {
+    if (const int turned = direction(here.delta_deg - rest_.delta_deg); turned != 0) {
+      approach_ = turned;
+    }
+    rest_ = here;
+    arrival_s_ = t_s;
+    moving_ = false;
+  }
+}
+
+void PoseTracker::arrive(double t_s, double delta_deg, double h_deg, long long pose) {
+  const Angles here{delta_deg, h_deg};
+  previous_ = started_ ? rest_ : here;
+  started_ = true;
+  moving_ = false;
+  if (const int turned = direction(here.delta_deg - rest_.delta_deg); turned != 0) {
+    approach_ = turned;
+  }
+  rest_ = here;
+  pose_ = pose;
+  arrival_s_ = t_s;
+}
+
+}  // namespace plumbline::sim
