@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -22,7 +21,8 @@ class Acquisition {
   Acquisition(const Acquisition&) = delete;
   Acquisition& operator=(const Acquisition&) = delete;
 
-  /// Opens the source and starts the thread.
+  /// Opens the source and starts the thread. After a failure it may be called again: the source is
+  /// opened anew and its sample clock goes on.
   Result<void> start();
   void stop();
 
@@ -35,12 +35,16 @@ class Acquisition {
 
  private:
   void run();
+  /// Takes what there is room for; the mutex is held.
+  void store(SampleBatch& batch);
 
   std::unique_ptr<SampleSource> source_;
   std::size_t capacity_;
   mutable std::mutex mutex_;
   std::condition_variable arrived_;
+  std::condition_variable room_;  ///< for a log, which waits where a live source drops
   SampleBatch queue_;
+  std::uint64_t queue_drops_ = 0;
   SourceStatistics statistics_;
   std::optional<Error> failure_;
   bool stopping_ = false;

@@ -1,6 +1,7 @@
 // What rig.toml says about the head and the sensor: [head] and [sensor], read strictly.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -9,34 +10,26 @@
 
 #include "estimator/measurement.h"
 #include "rig/dividing_head.h"
+#include "rig/frame_layout.h"
+#include "rig/register_map.h"
 #include "rig/sample_source.h"
 #include "rig/strict_toml.h"
 
 namespace plumbline::rig {
 
-enum class WordOrder { high_first, low_first };
-
 /// [head]: how the drive is reached and how its registers are laid out.
 /// The defaults are those of the simulated rig (design: RIG.md's register map).
 struct HeadConfig {
-  std::string modbus;  ///< "tcp:HOST:PORT" or "rtu:DEVICE,115200,8E1"
-  int unit_id = 1;
+  std::string modbus;                             ///< "tcp:HOST:PORT" or "rtu:DEVICE,115200,8E1"
+  std::array<int, 2> unit_id = {1, 1};            ///< of δ and h
   std::array<int, 2> axis_base = {0x000, 0x100};  ///< register base of δ and h
-  WordOrder word_order = WordOrder::high_first;
+  RegisterMap registers;
   std::array<double, 2> counts_per_deg = {10000.0, 10000.0};
   double speed_deg_s = 30.0;
   double acceleration_deg_s2 = 60.0;
   std::chrono::milliseconds response_timeout{1000};
   std::chrono::milliseconds poll_interval{20};
   std::chrono::milliseconds watchdog{3000};  ///< 0 = off
-  // Register offsets and status bit numbers follow in register_map.h; the configuration may change
-  // any of them by name under [head.registers] and [head.status_bits].
-};
-
-/// A bus signal that is recorded as a covariate column.
-struct CovariateSignal {
-  std::string column;  ///< e.g. "rh_pct"
-  std::string signal;  ///< "MESSAGE.Signal" of the DBC file
 };
 
 /// [sensor]: where the frames come from and what they mean.
@@ -45,14 +38,20 @@ struct SensorConfig {
   std::string dbc_file;  ///< empty: the layout that comes with the program
   double rate_hz = 100;  ///< nominal sample rate of the node
   Adc adc;               ///< span of the codes
+  SignalRoles signals;   ///< [sensor.signals]
   std::vector<CovariateSignal> covariates;
   std::chrono::milliseconds silence_timeout{3000};
 };
 
+/// Contradictions are reported through `table`, like wrong values.
 Result<HeadConfig> read_head_config(StrictTable& table);
-Result<SensorConfig> read_sensor_config(StrictTable& table);
+/// `adc` is what [adc] says, if it stands in the file: the default for bits, min_V and max_V.
+Result<SensorConfig> read_sensor_config(StrictTable& table,
+                                        const std::optional<Adc>& adc = std::nullopt);
 
+/// Not yet connected. ErrorCode::input when the endpoint is missing or malformed.
 Result<std::unique_ptr<DividingHead>> make_dividing_head(const HeadConfig& config);
+/// Not yet opened. ErrorCode::input when the address or the DBC file is wrong.
 Result<std::unique_ptr<SampleSource>> make_sample_source(const SensorConfig& config);
 
 }  // namespace plumbline::rig

@@ -76,7 +76,7 @@ Result<RigDescription> parse_rig_description(std::string_view text, const std::s
   if (!head_config) return fail(head_config.error());
   rig.head = *std::move(head_config);
   StrictTable sensor = root.table("sensor");
-  auto sensor_config = rig::read_sensor_config(sensor);
+  auto sensor_config = rig::read_sensor_config(sensor, rig.run.adc);
   if (!sensor_config) return fail(sensor_config.error());
   rig.sensor = *std::move(sensor_config);
   if (!rig.run.adc) {
