@@ -119,7 +119,6 @@ Result<void> ModbusServer::open_tcp(const std::string& host_and_port) {
   socklen_t size = sizeof name;
   ::getsockname(listener_.get(), generic, &size);
   endpoint_ = fmt::format("tcp:{}:{}", host, ntohs(name.sin_port));
-  context_.reset(modbus_new_tcp(host.c_str(), ntohs(name.sin_port)));
   return {};
 }
 
@@ -150,12 +149,12 @@ Result<void> ModbusServer::open_rtu(const std::string& link) {
   link_ = link;
   endpoint_ = address + ",115200,8E1";
   clients_.push_back(std::move(master));
-  context_.reset(modbus_new_rtu(terminal_name.data(), 115200, 'E', 8, 1));
   return {};
 }
 
 Result<void> ModbusServer::prepare() {
   std::array<int, 2> pair{-1, -1};
+  make_context();
   mapping_.reset(modbus_mapping_new(0, 0, kRegisterEnd, 0));
   if (!context_ || !mapping_ ||
       ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
@@ -163,12 +162,19 @@ Result<void> ModbusServer::prepare() {
   }
   capture_in_ = Descriptor(pair[0]);
   capture_out_ = Descriptor(pair[1]);
+  return {};
+}
+
+void ModbusServer::make_context() {
+  // The names are never used: the context is not connected but given our descriptors one by one.
+  context_.reset(is_tcp() ? modbus_new_tcp("127.0.0.1", 0)
+                          : modbus_new_rtu("/dev/null", 115200, 'E', 8, 1));
+  if (!context_) return;
   modbus_set_slave(context_.get(), unit_id_);
   // libmodbus waits this long before it refuses a malformed request; our clients need not.
   modbus_set_response_timeout(context_.get(), 0, 1);
   // Half a request must not keep other clients waiting.
   modbus_set_byte_timeout(context_.get(), 0, 200000);
-  return {};
 }
 
 std::size_t ModbusServer::header_length() const {
@@ -205,8 +211,13 @@ bool ModbusServer::serve(std::size_t client, const std::stop_token& stop) {
   if (length < 0)
     return !is_tcp();  // a serial line goes on after noise, a stream has lost its place
   const std::span request(bytes.data(), static_cast<std::size_t>(length));
-  if (request.size() <= header_length()) return true;  // for another unit on the serial line
-  if (request[header_length() - 1] != unit_id_) return true;
+  if (length == 0) {
+    // For another unit on the serial line. libmodbus would now take the next request for that
+    // unit's reply and swallow it; but there is no other unit here, so it has to forget about it.
+    make_context();
+    return true;
+  }
+  if (request.size() <= header_length() || request[header_length() - 1] != unit_id_) return true;
   return answer(client, request, stop);
 }
 

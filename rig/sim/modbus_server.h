@@ -42,6 +42,7 @@ class ModbusServer {
   Result<void> open_tcp(const std::string& host_and_port);
   Result<void> open_rtu(const std::string& link);
   Result<void> prepare();
+  void make_context();
 
   void run(const std::stop_token& stop);
   void accept_client();

@@ -14,7 +14,11 @@ Result<void> write_ready_file(const std::filesystem::path& path, const std::stri
   std::filesystem::path draft = path;
   draft += fmt::format(".{}", ::getpid());
   std::ofstream file(draft);
-  file << toml::table{{"modbus", modbus}, {"can", can}} << '\n';
+  const toml::table endpoints{{"modbus", modbus}, {"can", can}};
+  // Plain double quotes, for readers that are simpler than a TOML parser.
+  file << toml::toml_formatter(endpoints, toml::toml_formatter::default_flags &
+                                              ~toml::format_flags::allow_literal_strings)
+       << '\n';
   file.close();
   std::error_code error;
   if (file) {
