@@ -2,8 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "rig/sim/drive_settings.h"
 #include "rig/sim/faults.h"
+#include "rig/sim/world.h"
 
 namespace plumbline::sim {
 namespace {
@@ -86,6 +89,18 @@ TEST(WireFaults, WrongEntriesAreRefusedByName) {
               HasSubstr("slip_deg"));
   EXPECT_THAT(parse("[[faults]]\nkind='modbus.exception'\ncode=12").error().message,
               HasSubstr("world.toml:3"));
+}
+
+TEST(WireFaults, ReadyMadeWorldsShowEveryKind) {
+  std::set<FaultKind> kinds;
+  for (const char* name : {"faulty-bus.toml", "faulty-drive.toml"}) {
+    auto world = read_world(std::string(PLUMBLINE_SOURCE_DIR "/rig/sim/worlds/") + name);
+    ASSERT_TRUE(world.has_value()) << world.error().message;
+    for (const Fault& fault : world->faults.all) kinds.insert(fault.kind);
+  }
+  for (int kind = 0; kind <= static_cast<int>(FaultKind::can_duplicate); ++kind) {
+    EXPECT_TRUE(kinds.contains(static_cast<FaultKind>(kind))) << "kind " << kind;
+  }
 }
 
 TEST(WireFaults, DriveSettingsAreRead) {
