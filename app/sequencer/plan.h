@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/measurement.h"
@@ -11,7 +13,18 @@
 
 namespace plumbline::app {
 
-enum class VisitOrder { raster, snake, spiral, random };
+/// How the nodes of the grid are strung together.
+enum class VisitOrder {
+  raster,  ///< ring by ring (one h each), every ring from the smallest δ
+  snake,   ///< ring by ring, to and fro
+  spiral,  ///< ring by ring, the spindle turning on in one direction: δ goes beyond 360°
+  random,  ///< shuffled: costs travel, but keeps a drift apart from the position
+};
+const char* to_string(VisitOrder order);
+/// In the order of the enumerators, for configuration and command line.
+const std::vector<std::string>& visit_order_names();
+/// Empty when `name` is none of visit_order_names().
+std::optional<VisitOrder> visit_order_from(std::string_view name);
 
 /// [plan] of rig.toml.
 struct PlanOptions {
@@ -51,12 +64,28 @@ struct PlanTime {
   double total_s() const { return moving_s + sampling_s + settling_s; }
 };
 
+/// Soak (when asked for), every node of the grid once, verification poses (when asked for).
+/// Verification angles lie within the grid's span, rounded to 0.01°, at least 1° (or a quarter of a
+/// narrower step) from every node; a grid of a single node leaves no room for any. Deterministic in
+/// its arguments.
 Plan make_plan(const Grid& grid, const PlanOptions& options, double rate_hz);
-/// Refuses the first step (via positions included) outside the limits, by number and angle.
+
+/// Refuses the first position (those passed through included) outside the limits, by step number
+/// and angle. ErrorCode::input.
 Result<void> check_plan(const Plan& plan, const rig::SoftLimits& limits);
+
+/// Seconds that one axis needs from rest to rest: trapezoidal speed profile, a triangle when the
+/// way is shorter than v²/a.
+double travel_s(double way_deg, const AxisMotion& motion);
+/// Both axes start together; the one that takes longer counts.
+double travel_s(const rig::HeadAngles& from, const rig::HeadAngles& to, const AxisMotion& motion);
+
+/// Starts with the head at the first step's target: homing and the way from there are not counted.
 PlanTime time_plan(const Plan& plan, const AxisMotion& motion, double rate_hz,
                    double settle_s_per_pose);
-/// One line per step: ordinal,kind,delta_deg,h_deg,samples,via
+
+/// A header and one line per step: ordinal,kind,delta_deg,h_deg,samples,via. `via` holds positions
+/// as "δ:h", separated by blanks. Numbers are printed so that they read back unchanged.
 std::string to_csv(const Plan& plan);
 
 }  // namespace plumbline::app

@@ -1,0 +1,66 @@
+// When has the output come to rest after a move? Judged by the samples alone, on the sensor's
+// clock.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "estimator/measurement.h"
+
+namespace plumbline::app {
+
+/// [settling] of rig.toml.
+struct SettlingOptions {
+  double window_s = 0.25;    ///< length of the sliding window that is judged
+  double cap_s = 10;         ///< sampling starts after so long in any case; the pose is marked
+  double slope_limit = 4;    ///< largest slope of the window, in standard errors
+  double scatter_limit = 4;  ///< largest excess of its variance, in standard errors
+  double angle_tolerance_deg = 0.01;  ///< of the encoder reading against the commanded angle
+  /// Standard deviation of one sample at rest, same for the three axes; 0: learnt from the soak.
+  double noise_V = 0;
+};
+
+/// What windows of a unit at rest look like.
+struct NoiseFloor {
+  PerAxis<double> sd_V{};          ///< about the window's own line
+  PerAxis<double> slope_sd_V_s{};  ///< of the window's slope; more than sd_V says when the noise is
+                                   ///< coloured
+};
+
+/// Samples in one window: at least 8.
+std::size_t window_samples(const SettlingOptions& options, double rate_hz);
+
+/// White noise of `sd_V` on every axis: the slope's standard error is sd·sqrt(12/(n(n²−1)))·rate.
+/// Neither goes below what rounding to the converter's step alone can do.
+NoiseFloor white_noise_floor(double sd_V, const Adc& adc, std::size_t window, double rate_hz);
+
+/// Medians over the windows of a record at rest, so that single disturbances do not count. Windows
+/// across a gap of the counter are left out; empty when no whole window remains.
+std::optional<NoiseFloor> learn_noise_floor(const std::vector<RawSample>& soak, const Adc& adc,
+                                            std::size_t window, double rate_hz);
+
+/// Slides a window over the samples that follow an arrival. Without a floor the slope is judged by
+/// the window's own scatter, and the scatter not at all.
+class SettlingDetector {
+ public:
+  SettlingDetector(const SettlingOptions& options, const Adc& adc, double rate_hz,
+                   std::optional<NoiseFloor> floor);
+
+  /// Forgets everything: a new arrival.
+  void restart();
+  /// Takes the next sample; a gap of the counter starts the window anew. True when the window is
+  /// full and at rest.
+  bool add(const RawSample& sample);
+
+ private:
+  SettlingOptions options_;
+  Adc adc_;
+  double rate_hz_;
+  std::size_t window_;
+  std::optional<NoiseFloor> floor_;
+  std::deque<RawSample> samples_;
+};
+
+}  // namespace plumbline::app
