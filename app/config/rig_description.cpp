@@ -14,17 +14,11 @@ using rig::StrictTable;
 
 constexpr const char* kRigTables[] = {"head", "sensor", "plan", "settling"};
 
-VisitOrder order_named(const std::string& name) {
-  if (name == "raster") return VisitOrder::raster;
-  if (name == "spiral") return VisitOrder::spiral;
-  if (name == "random") return VisitOrder::random;
-  return VisitOrder::snake;
-}
-
 PlanOptions read_plan_options(StrictTable table) {
   PlanOptions plan;
   plan.order =
-      order_named(table.choice_or("order", "snake", {"raster", "snake", "spiral", "random"}));
+      visit_order_from(table.choice_or("order", to_string(plan.order), visit_order_names()))
+          .value_or(plan.order);
   plan.one_sided = table.flag_or("one_sided", plan.one_sided);
   plan.approach_deg = table.number_or("approach_deg", plan.approach_deg, {0.01, 45});
   plan.soak_s = table.number_or("soak_s", plan.soak_s, {0, 1e6});
@@ -42,9 +36,12 @@ PlanOptions read_plan_options(StrictTable table) {
 SettlingOptions read_settling_options(StrictTable table) {
   SettlingOptions settling;
   settling.hold_s = table.number_or("hold_s", settling.hold_s, {0, 600});
-  settling.window = static_cast<int>(table.integer_or("window", settling.window, {4, 100000}));
+  settling.window = static_cast<int>(table.integer_or("window", settling.window, {8, 100000}));
   settling.sigma_factor = table.number_or("sigma_factor", settling.sigma_factor, {1, 1000});
   settling.cap_s = table.number_or("cap_s", settling.cap_s, {0.01, 3600});
+  settling.noise_V = table.number_or("noise_V", settling.noise_V, {0, 1000});
+  settling.angle_tolerance_deg =
+      table.number_or("angle_tolerance_deg", settling.angle_tolerance_deg, {1e-6, 10});
   if (settling.cap_s < settling.hold_s) {
     table.refuse("cap_s",
                  fmt::format("{} is shorter than hold_s = {}", settling.cap_s, settling.hold_s));

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "app/sequencer/plan.h"
-#include "app/sequencer/settling_options.h"
+#include "app/sequencer/settling.h"
 #include "estimator/measurement.h"
 #include "rig/rig_config.h"
 #include "rig/strict_toml.h"

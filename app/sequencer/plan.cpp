@@ -26,7 +26,7 @@ constexpr double kVerificationParts = 100;
 double rounded(double value, double parts) { return std::round(value * parts) / parts; }
 
 std::vector<double> nodes(const AngleRange& range) {
-  assert(range.step_deg > 0 && range.stop_deg >= range.start_deg);
+  assert(range.step_deg != 0 && (range.stop_deg - range.start_deg) / range.step_deg >= 0);
   const auto steps = static_cast<int>(
       std::floor((range.stop_deg - range.start_deg) / range.step_deg + kAngleRounding_deg));
   std::vector<double> angles;
@@ -70,8 +70,9 @@ std::vector<HeadAngles> verification_positions(const Grid& grid, int count,
   const std::vector<double> tilts = nodes(grid.h);
   std::vector<HeadAngles> positions;
   if (deltas.size() * tilts.size() == 1) return positions;
-  const double delta_clearance = std::min(kVerificationClearance_deg, grid.delta.step_deg / 4);
-  const double h_clearance = std::min(kVerificationClearance_deg, grid.h.step_deg / 4);
+  const double delta_clearance =
+      std::min(kVerificationClearance_deg, std::abs(grid.delta.step_deg) / 4);
+  const double h_clearance = std::min(kVerificationClearance_deg, std::abs(grid.h.step_deg) / 4);
   while (std::ssize(positions) < count) {
     const HeadAngles candidate{
         rounded(uniform(random, deltas.front(), deltas.back()), kVerificationParts),

@@ -8,7 +8,7 @@ namespace plumbline::app {
 
 namespace {
 
-constexpr std::size_t kSmallestWindow = 8;
+constexpr int kSmallestWindow = 8;
 /// Median of |x| of a standard normal variable, inverted: turns a median into a standard deviation.
 constexpr double kMedianToSd = 1.4826;
 
@@ -54,10 +54,6 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-std::size_t window_samples(const SettlingOptions& options, double rate_hz) {
-  return std::max(kSmallestWindow, static_cast<std::size_t>(options.window_s * rate_hz + 0.5));
-}
-
 NoiseFloor white_noise_floor(double sd_V, const Adc& adc, std::size_t window, double rate_hz) {
   // A level between two codes makes the reading toggle: a standard deviation of half a step.
   const double sd = std::max(sd_V, adc.lsb_V() / 2);
@@ -69,7 +65,6 @@ NoiseFloor white_noise_floor(double sd_V, const Adc& adc, std::size_t window, do
 
 std::optional<NoiseFloor> learn_noise_floor(const std::vector<RawSample>& soak, const Adc& adc,
                                             std::size_t window, double rate_hz) {
-  assert(window >= kSmallestWindow);
   PerAxis<std::vector<double>> variances;
   PerAxis<std::vector<double>> slopes;
   const auto length = static_cast<std::ptrdiff_t>(window);
@@ -97,27 +92,25 @@ std::optional<NoiseFloor> learn_noise_floor(const std::vector<RawSample>& soak, 
 
 SettlingDetector::SettlingDetector(const SettlingOptions& options, const Adc& adc, double rate_hz,
                                    std::optional<NoiseFloor> floor)
-    : options_(options),
-      adc_(adc),
-      rate_hz_(rate_hz),
-      window_(window_samples(options, rate_hz)),
-      floor_(floor) {}
+    : options_(options), adc_(adc), rate_hz_(rate_hz), floor_(floor) {
+  assert(options.window >= kSmallestWindow);
+}
 
 void SettlingDetector::restart() { samples_.clear(); }
 
 bool SettlingDetector::add(const RawSample& sample) {
   if (!samples_.empty() && !consecutive(samples_.back(), sample)) samples_.clear();
   samples_.push_back(sample);
-  if (samples_.size() > window_) samples_.pop_front();
-  if (samples_.size() < window_) return false;
-  const double largest_excess =
-      1 + options_.scatter_limit * std::sqrt(2.0 / static_cast<double>(window_ - 2));
+  const auto window = static_cast<std::size_t>(options_.window);
+  if (samples_.size() > window) samples_.pop_front();
+  if (samples_.size() < window) return false;
+  const double largest_excess = 1 + options_.sigma_factor * std::sqrt(2.0 / (options_.window - 2));
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const Line line = fit_line(samples_.begin(), samples_.end(), axis, adc_, rate_hz_);
     const double slope_sd = floor_ ? floor_->slope_sd_V_s[axis]
                                    : std::max(std::sqrt(line.variance_V2), adc_.lsb_V() / 2) *
-                                         slope_error(window_, rate_hz_);
-    if (std::abs(line.slope_V_s) > options_.slope_limit * slope_sd) return false;
+                                         slope_error(window, rate_hz_);
+    if (std::abs(line.slope_V_s) > options_.sigma_factor * slope_sd) return false;
     if (floor_ && line.variance_V2 > floor_->sd_V[axis] * floor_->sd_V[axis] * largest_excess)
       return false;
   }

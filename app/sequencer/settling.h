@@ -2,7 +2,7 @@
 // clock.
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <deque>
 #include <optional>
 #include <vector>
@@ -11,15 +11,17 @@
 
 namespace plumbline::app {
 
-/// [settling] of rig.toml.
+/// [settling] of rig.toml. A pose is accepted once the head has been in position for `hold_s` and,
+/// over a window of the latest samples, slope and scatter lie within what the noise leaves; or at
+/// the hard cap. All times are those of the sensor's clock.
 struct SettlingOptions {
-  double window_s = 0.25;    ///< length of the sliding window that is judged
-  double cap_s = 10;         ///< sampling starts after so long in any case; the pose is marked
-  double slope_limit = 4;    ///< largest slope of the window, in standard errors
-  double scatter_limit = 4;  ///< largest excess of its variance, in standard errors
-  double angle_tolerance_deg = 0.01;  ///< of the encoder reading against the commanded angle
-  /// Standard deviation of one sample at rest, same for the three axes; 0: learnt from the soak.
+  double hold_s = 0.1;        ///< "in position" without interruption, before anything is judged
+  int window = 20;            ///< samples judged together, at least 8
+  double sigma_factor = 4.0;  ///< how many standard errors slope and variance may lie off
+  double cap_s = 10.0;        ///< accepted at the latest then, and recorded as capped
+  /// Standard deviation of one sample at rest, for all axes; 0: learnt from the soak.
   double noise_V = 0;
+  double angle_tolerance_deg = 0.01;  ///< of the encoder readings against the commanded angles
 };
 
 /// What windows of a unit at rest look like.
@@ -28,9 +30,6 @@ struct NoiseFloor {
   PerAxis<double> slope_sd_V_s{};  ///< of the window's slope; more than sd_V says when the noise is
                                    ///< coloured
 };
-
-/// Samples in one window: at least 8.
-std::size_t window_samples(const SettlingOptions& options, double rate_hz);
 
 /// White noise of `sd_V` on every axis: the slope's standard error is sd·sqrt(12/(n(n²−1)))·rate.
 /// Neither goes below what rounding to the converter's step alone can do.
@@ -58,7 +57,6 @@ class SettlingDetector {
   SettlingOptions options_;
   Adc adc_;
   double rate_hz_;
-  std::size_t window_;
   std::optional<NoiseFloor> floor_;
   std::deque<RawSample> samples_;
 };

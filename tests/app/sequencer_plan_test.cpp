@@ -146,7 +146,7 @@ Case any_case() {
   made.grid.delta.start_deg = *rc::gen::element(-90.0, 0.0, 15.0);
   made.grid.delta.stop_deg =
       made.grid.delta.start_deg + made.grid.delta.step_deg * *rc::gen::inRange(0, 3);
-  made.grid.h.step_deg = *rc::gen::element(0.5, 10.0, 22.5);
+  made.grid.h.step_deg = *rc::gen::element(0.5, 10.0, -22.5);  // from above as well
   made.grid.h.stop_deg = made.grid.h.step_deg * *rc::gen::inRange(1, 5);
   made.options.order = *rc::gen::element(VisitOrder::raster, VisitOrder::snake, VisitOrder::spiral,
                                          VisitOrder::random);
@@ -202,7 +202,7 @@ RC_GTEST_PROP(PlanProperty, VerificationLiesOffTheGridAndWithinItsSpan, ()) {
   const Case made = any_case();
   const Plan plan = make_plan(made.grid, made.options, kRate_Hz);
   const double delta_clearance = std::min(1.0, made.grid.delta.step_deg / 4);
-  const double h_clearance = std::min(1.0, made.grid.h.step_deg / 4);
+  const double h_clearance = std::min(1.0, std::abs(made.grid.h.step_deg) / 4);
   std::vector<rig::HeadAngles> grid;
   for (const PlanStep& step : plan.steps)
     if (step.kind == PoseKind::grid) grid.push_back(step.target);
@@ -210,8 +210,8 @@ RC_GTEST_PROP(PlanProperty, VerificationLiesOffTheGridAndWithinItsSpan, ()) {
   for (const PlanStep& step : plan.steps) {
     if (step.kind != PoseKind::verification) continue;
     ++verifications;
-    RC_ASSERT(step.target.h_deg >= made.grid.h.start_deg);
-    RC_ASSERT(step.target.h_deg <= made.grid.h.stop_deg);
+    RC_ASSERT(step.target.h_deg >= std::min(made.grid.h.start_deg, made.grid.h.stop_deg));
+    RC_ASSERT(step.target.h_deg <= std::max(made.grid.h.start_deg, made.grid.h.stop_deg));
     for (const rig::HeadAngles& node : grid) {
       const double apart = std::remainder(step.target.delta_deg - node.delta_deg, 360.0);
       RC_ASSERT(std::abs(apart) >= delta_clearance - 1e-6 ||
