@@ -57,6 +57,7 @@ int run(int argc, char** argv) {
   add_calibrate(program, invocation);
   add_evaluate(program, invocation);
   add_noise(program, invocation);
+  add_plan(program, invocation);
   add_help(program, invocation);
 
   try {

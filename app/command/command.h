@@ -22,6 +22,7 @@ struct Invocation {
 void add_calibrate(CLI::App& program, Invocation& invocation);
 void add_evaluate(CLI::App& program, Invocation& invocation);
 void add_noise(CLI::App& program, Invocation& invocation);
+void add_plan(CLI::App& program, Invocation& invocation);
 void add_help(CLI::App& program, Invocation& invocation);
 
 }  // namespace plumbline::app

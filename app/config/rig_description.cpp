@@ -49,6 +49,18 @@ SettlingOptions read_settling_options(StrictTable table) {
   return settling;
 }
 
+/// soft_limits = { delta_deg = [lower, upper], h_deg = [lower, upper] }
+std::optional<rig::SoftLimits> read_soft_limits(StrictTable& head) {
+  if (!head.has("soft_limits")) return std::nullopt;
+  StrictTable table = head.table("soft_limits");
+  const auto delta = table.numbers_or("delta_deg", {-1e6, 1e6}, 2);
+  const auto h = table.numbers_or("h_deg", {-1e6, 1e6}, 2);
+  if (delta.size() != 2 || h.size() != 2) return std::nullopt;  // refused already
+  if (delta[0] > delta[1]) table.refuse("delta_deg", "the lower limit comes first");
+  if (h[0] > h[1]) table.refuse("h_deg", "the lower limit comes first");
+  return rig::SoftLimits{{delta[0], h[0]}, {delta[1], h[1]}};
+}
+
 bool same(const Adc& a, const Adc& b) {
   return a.bits == b.bits && a.min_V == b.min_V && a.max_V == b.max_V;
 }
@@ -72,6 +84,7 @@ Result<RigDescription> parse_rig_description(std::string_view text, const std::s
   auto head_config = rig::read_head_config(head);
   if (!head_config) return fail(head_config.error());
   rig.head = *std::move(head_config);
+  rig.soft_limits = read_soft_limits(head);
   StrictTable sensor = root.table("sensor");
   auto sensor_config = rig::read_sensor_config(sensor, rig.run.adc);
   if (!sensor_config) return fail(sensor_config.error());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -20,6 +21,8 @@ struct RigDescription {
   rig::SensorConfig sensor;
   PlanOptions plan;
   SettlingOptions settling;
+  /// [head] soft_limits, so that a plan can be checked without the drive.
+  std::optional<rig::SoftLimits> soft_limits;
   std::string source;  ///< the text as it was read, to be stored with the run
 };
 

@@ -54,6 +54,10 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
+double shortest_settling_s(const SettlingOptions& options, double rate_hz) {
+  return options.hold_s + options.window / rate_hz;
+}
+
 NoiseFloor white_noise_floor(double sd_V, const Adc& adc, std::size_t window, double rate_hz) {
   // A level between two codes makes the reading toggle: a standard deviation of half a step.
   const double sd = std::max(sd_V, adc.lsb_V() / 2);

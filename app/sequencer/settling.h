@@ -24,6 +24,9 @@ struct SettlingOptions {
   double angle_tolerance_deg = 0.01;  ///< of the encoder readings against the commanded angles
 };
 
+/// From arrival to the first sample when nothing has to be waited for.
+double shortest_settling_s(const SettlingOptions& options, double rate_hz);
+
 /// What windows of a unit at rest look like.
 struct NoiseFloor {
   PerAxis<double> sd_V{};          ///< about the window's own line

@@ -1,0 +1,89 @@
+// `plumbline plan`: prints, checks and times what `run` would do, without hardware.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "app/command/command.h"
+#include "app/config/rig_description.h"
+#include "app/sequencer/plan.h"
+
+namespace plumbline::app {
+
+namespace {
+
+struct PlanArguments {
+  std::string config;
+  std::string order;
+  bool one_sided = false;
+  std::optional<std::uint64_t> seed;
+  bool print = false;
+  std::string csv;
+};
+
+std::string minutes(double seconds) {
+  const auto whole = static_cast<long>(seconds + 0.5);
+  return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+Result<void> write_text(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) return fail(ErrorCode::output, fmt::format("{}: cannot be written", path));
+  return {};
+}
+
+Result<ExitCode> show_plan(const PlanArguments& arguments) {
+  const auto rig = read_rig_description(arguments.config);
+  if (!rig) return fail(rig.error());
+  PlanOptions options = rig->plan;
+  options.order = visit_order_from(arguments.order).value_or(options.order);
+  options.one_sided = options.one_sided || arguments.one_sided;
+  options.seed = arguments.seed.value_or(options.seed);
+  const Plan plan = make_plan(rig->run.grid, options, rig->sensor.rate_hz);
+  if (rig->soft_limits) {
+    if (auto allowed = check_plan(plan, *rig->soft_limits); !allowed) {
+      return fail(ErrorCode::input, arguments.config + ": " + allowed.error().message);
+    }
+  }
+  if (arguments.print) fmt::print("{}", to_csv(plan));
+  if (!arguments.csv.empty()) {
+    if (auto written = write_text(arguments.csv, to_csv(plan)); !written) {
+      return fail(written.error());
+    }
+  }
+  const PlanTime time =
+      time_plan(plan, {rig->head.speed_deg_s, rig->head.acceleration_deg_s2}, rig->sensor.rate_hz,
+                shortest_settling_s(rig->settling, rig->sensor.rate_hz));
+  fmt::print(
+      "{} steps, {} order{}: about {} (moving {:.1f} s, sampling {:.1f} s, settling {:.1f} s)\n"
+      "soft limits: {}\n",
+      plan.steps.size(), to_string(options.order), options.one_sided ? ", one-sided" : "",
+      minutes(time.total_s()), time.moving_s, time.sampling_s, time.settling_s,
+      rig->soft_limits ? "kept" : "not in the configuration; the drive's own are checked by run");
+  return ExitCode::done;
+}
+
+}  // namespace
+
+void add_plan(CLI::App& program, Invocation& invocation) {
+  CLI::App* sub = program.add_subcommand(
+      "plan", "print, check and time what run would do, without any hardware");
+  auto arguments = std::make_shared<PlanArguments>();
+  sub->add_option("--config", arguments->config, "rig.toml")->required();
+  sub->add_option("--order", arguments->order, "instead of the order in the configuration")
+      ->check(CLI::IsMember(visit_order_names()));
+  sub->add_flag("--one-sided", arguments->one_sided, "approach every position in +delta direction");
+  sub->add_option("--seed", arguments->seed, "of random order and verification angles");
+  sub->add_flag("--print", arguments->print, "print every step as CSV");
+  sub->add_option("--csv", arguments->csv, "write the steps into this file");
+  sub->callback([arguments, &invocation] {
+    invocation.action = [arguments] { return show_plan(*arguments); };
+  });
+}
+
+}  // namespace plumbline::app
