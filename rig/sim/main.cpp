@@ -10,12 +10,15 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <map>
 #include <string>
+#include <utility>
 
 #include "rig/sim/can_node.h"
 #include "rig/sim/machine.h"
 #include "rig/sim/modbus_server.h"
 #include "rig/sim/ready_file.h"
+#include "rig/sim/record.h"
 #include "rig/sim/world.h"
 
 namespace plumbline::sim {
@@ -29,6 +32,10 @@ struct Options {
   std::uint64_t seed = 1;
   std::filesystem::path ready_file;
   bool exit_with_parent = false;
+
+  std::filesystem::path record;  ///< folder of a recorded set; empty: serve the wires
+  std::filesystem::path plan;
+  RecordOptions recording;
 };
 
 int exit_code(ErrorCode code) {
@@ -86,6 +93,42 @@ Result<void> serve(const Options& options, const sigset_t& ending) {
   return {};
 }
 
+Result<void> record_to_files(Options& options) {
+  auto world = read_world(options.world);
+  if (!world) return fail(world.error());
+  options.recording.seed = options.seed;
+  if (!options.plan.empty()) {
+    auto plan = read_plan(options.plan);
+    if (!plan) return fail(plan.error());
+    options.recording.plan = std::move(*plan);
+  }
+  return record(*world, options.recording, options.record);
+}
+
+/// The group of options that go with --record.
+void add_record_options(CLI::App& app, Options& options) {
+  const std::map<std::string, RecordOrder> orders = {{"raster", RecordOrder::raster},
+                                                     {"snake", RecordOrder::snake},
+                                                     {"spiral", RecordOrder::spiral},
+                                                     {"random", RecordOrder::random}};
+  RecordOptions& recording = options.recording;
+  auto* folder = app.add_option("--record", options.record,
+                                "no wires: write a whole recorded set into this folder");
+  const auto add = [&](const char* name, auto& value, const char* text) {
+    return app.add_option(name, value, text)->needs(folder)->capture_default_str();
+  };
+  add("--plan", options.plan, "positions to visit, as `plumbline plan` prints them");
+  add("--order", recording.order, "raster, snake, spiral or random")
+      ->transform(CLI::CheckedTransformer(orders));
+  add("--samples-per-pose", recording.samples_per_pose, "samples taken at each position")
+      ->check(CLI::Range(1, 1'000'000));
+  add("--soak", recording.soak_s, "seconds at rest before the grid")->check(CLI::Range(0.0, 1e6));
+  add("--verification-poses", recording.verification_poses, "random poses after the grid")
+      ->check(CLI::Range(0, 100'000));
+  add("--settle", recording.settle_s, "seconds waited after every move")
+      ->check(CLI::Range(0.0, 1e4));
+}
+
 int run(int argc, char** argv) {
   const pid_t parent = getppid();
   const sigset_t ending = block_ending_signals();
@@ -96,9 +139,8 @@ int run(int argc, char** argv) {
   Options options;
   app.add_option("--world", options.world, "world file (TOML): unit, noise, effects, faults")
       ->required();
-  app.add_option("--modbus", options.modbus, "tcp:ADDRESS:PORT (port 0: any free one) or rtu:LINK")
-      ->required();
-  app.add_option("--can", options.can, "unix:PATH or can:INTERFACE")->required();
+  app.add_option("--modbus", options.modbus, "tcp:ADDRESS:PORT (port 0: any free one) or rtu:LINK");
+  app.add_option("--can", options.can, "unix:PATH or can:INTERFACE");
   app.add_option("--speed", options.speed, "world seconds in one second")
       ->check(CLI::Range(0.001, 10000.0));
   app.add_option("--seed", options.seed, "of everything random");
@@ -106,8 +148,12 @@ int run(int argc, char** argv) {
                  "written with the real endpoints once it serves");
   app.add_flag("--exit-with-parent", options.exit_with_parent,
                "end when the program that started this one ends");
+  add_record_options(app, options);
   try {
     app.parse(argc, argv);
+    if (options.record.empty() && (options.modbus.empty() || options.can.empty())) {
+      throw CLI::RequiredError("--modbus and --can, or --record");
+    }
   } catch (const CLI::Success& wanted) {  // --help, --version
     return app.exit(wanted);
   } catch (const CLI::ParseError& error) {
@@ -119,9 +165,10 @@ int run(int argc, char** argv) {
     prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (getppid() != parent) return 0;  // it ended before we could ask to be told
   }
-  if (auto served = serve(options, ending); !served) {
-    fmt::print(stderr, "plumbline-simrig: {}\n", served.error().message);
-    return exit_code(served.error().code);
+  const auto done = options.record.empty() ? serve(options, ending) : record_to_files(options);
+  if (!done) {
+    fmt::print(stderr, "plumbline-simrig: {}\n", done.error().message);
+    return exit_code(done.error().code);
   }
   return 0;
 }

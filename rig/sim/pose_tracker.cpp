@@ -42,16 +42,14 @@ void PoseTracker::observe(double t_s, const HeadState& head) {
   }
 }
 
-void PoseTracker::arrive(double t_s, double delta_deg, double h_deg, long long pose) {
-  const Angles here{delta_deg, h_deg};
+void PoseTracker::arrive(double t_s, const Arrival& arrival) {
+  const Angles here{arrival.delta_deg, arrival.h_deg};
   previous_ = started_ ? rest_ : here;
   started_ = true;
   moving_ = false;
-  if (const int turned = direction(here.delta_deg - rest_.delta_deg); turned != 0) {
-    approach_ = turned;
-  }
+  if (arrival.approach != 0) approach_ = arrival.approach;
   rest_ = here;
-  pose_ = pose;
+  pose_ = arrival.pose;
   arrival_s_ = t_s;
 }
 

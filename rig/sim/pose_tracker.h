@@ -13,8 +13,8 @@ class PoseTracker {
  public:
   /// The head at the next instant; times must not decrease.
   void observe(double t_s, const HeadState& head);
-  /// The head stands at another pose since t_s; what lay between is not looked at.
-  void arrive(double t_s, double delta_deg, double h_deg, long long pose);
+  /// The head stands at another pose since t_s.
+  void arrive(double t_s, const Arrival& arrival);
 
   bool moving() const { return moving_; }
   int approach() const { return approach_; }  ///< direction of the last δ motion

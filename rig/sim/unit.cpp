@@ -166,19 +166,19 @@ double Unit::next_time_s() const { return impl_->time_of(impl_->counter); }
 
 const SampleTruth& Unit::truth() const { return impl_->last; }
 
-void Unit::jump_to_pose(double t_s, double delta_deg, double h_deg, long long pose) {
+void Unit::jump_to_pose(const Arrival& arrival) {
   Impl& unit = *impl_;
-  // The first tick at or after t_s; the tolerance keeps a t_s that is a tick itself.
-  const auto arrival =
-      std::max(unit.counter, static_cast<std::int64_t>(std::ceil(t_s * unit.world.rate_hz - 1e-6)));
-  unit.noise_dt_s += static_cast<double>(arrival - unit.counter) / unit.world.rate_hz;
-  unit.counter = arrival;
-  unit.tracker.arrive(unit.time_of(arrival), delta_deg, h_deg, pose);
+  // The first tick at or after the arrival; the tolerance keeps an arrival that is a tick itself.
+  const auto tick = std::max(
+      unit.counter, static_cast<std::int64_t>(std::ceil(arrival.t_s * unit.world.rate_hz - 1e-6)));
+  unit.noise_dt_s += static_cast<double>(tick - unit.counter) / unit.world.rate_hz;
+  unit.counter = tick;
+  unit.tracker.arrive(unit.time_of(tick), arrival);
   unit.draw_positioning_error();
   HeadState head;
-  head.delta.angle_deg = delta_deg;
-  head.h.angle_deg = h_deg;
-  unit.moment_at(unit.time_of(arrival), head, true);
+  head.delta.angle_deg = arrival.delta_deg;
+  head.h.angle_deg = arrival.h_deg;
+  unit.moment_at(unit.time_of(tick), head, true);
 }
 
 }  // namespace plumbline::sim

@@ -43,6 +43,15 @@ struct SampleTruth {
   long long pose = 0;
 };
 
+/// The head stands at another pose; what lay between is not looked at.
+struct Arrival {
+  double t_s = 0;
+  double delta_deg = 0;
+  double h_deg = 0;
+  int approach = 0;    ///< direction of the last δ motion: −1, +1, or 0 when only h has moved
+  long long pose = 0;  ///< its number from now on
+};
+
 /// Produces one sample after another at the node's rate. Everything random comes from the seed
 /// alone, each source from a stream of its own: the same motion gives the same codes.
 class Unit {
@@ -55,10 +64,9 @@ class Unit {
   NodeSample next(const HeadState& head);
   double next_time_s() const;
 
-  /// For recording without wires: samples are left out until the clock is at or past t_s, and the
-  /// head then stands at the pose with this number. Noise, room and effects live through the gap;
-  /// a motion current flows during it.
-  void jump_to_pose(double t_s, double delta_deg, double h_deg, long long pose);
+  /// For recording without wires: leaves samples out until the clock is at or past the arrival.
+  /// Noise, room and effects live through the gap, which counts as motion.
+  void jump_to_pose(const Arrival& arrival);
   /// Of the sample returned last.
   const SampleTruth& truth() const;
 
