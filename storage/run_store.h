@@ -66,17 +66,26 @@ struct EventRecord {
   std::string text;
 };
 
-/// A run as it is handed to the engine: volts, times and columns like those of FORMATS section 2.
+/// A run as it is handed to the engine: volts, times and the columns of a measurement file.
+///
+/// Poses are numbered 0, 1, 2 … within their set in the order of the visits. A covariate is
+/// recorded slower than the samples: a sample gets the last reading of the run that is at most 60 s
+/// old, else the next one within 60 s. A quantity that leaves a sample of a set without such a
+/// reading gives no column there and is named in `left_out`.
 struct StoredRun {
   RunSummary summary;
   SampleTable soak;  ///< static record; empty when the plan had none
   MeasurementSet grid;
   MeasurementSet verification;  ///< poses empty when the plan had none
   std::vector<EventRecord> events;
+  std::vector<std::string> left_out;  ///< "rh_pct (grid)"
 };
 
-/// The only writing connection. Not thread safe: one owner. Failures are ErrorCode::storage, except
-/// open() of a missing or foreign file for reading, which is ErrorCode::input.
+/// The only writing connection. Not thread safe: one owner.
+///
+/// Failures while writing are ErrorCode::storage and leave the database as it was before the call.
+/// A file that is missing, foreign, damaged or of a newer program is ErrorCode::input, and so is
+/// everything that fails on a read-only store.
 class RunStore {
  public:
   /// Creates the file and its schema when absent; migrates an older schema; refuses a newer one.
@@ -88,9 +97,12 @@ class RunStore {
   ~RunStore();
 
   Result<RunId> create_run(const RunHeader& header);
-  /// Durable when it returns: pose, samples and covariates in one transaction.
+  /// Durable when it returns: pose, samples and covariates in one transaction. Refused (rig) when
+  /// it has no sample or its time does not go on after what the run holds already; refused
+  /// (storage) when its ordinal is stored already.
   Result<void> commit_pose(RunId run, const PoseRecord& pose);
   Result<void> add_event(RunId run, const EventRecord& event);
+  /// Sets the state; RunState::running with an empty time reopens a run that is resumed.
   Result<void> finish_run(RunId run, RunState state, const std::string& finished_utc);
 
   Result<std::vector<RunSummary>> runs() const;
