@@ -1,0 +1,18 @@
+// χ² and normal distributions, as far as limits and p-values need them.
+#pragma once
+
+namespace plumbline {
+
+/// P(χ²_dof > x). dof > 0.
+double chi_squared_tail(double x, double dof);
+
+/// x with P(χ²_dof ≤ x) = p, 0 < p < 1, dof > 0 (not necessarily whole).
+double chi_squared_quantile(double p, double dof);
+
+/// P(|Z| > z) of the standard normal distribution, z ≥ 0.
+double normal_two_sided_tail(double z);
+
+/// z with P(Z ≤ z) = p, 0 < p < 1.
+double normal_quantile(double p);
+
+}  // namespace plumbline
