@@ -111,8 +111,7 @@ Variance hadamard_total_variance(const std::vector<double>& x, std::size_t m) {
     const std::size_t offset = run - half;
     double difference = 0;
     for (std::size_t i = 0; i < half; ++i) difference += y[i + offset] - y[i];
-    const double slope =
-        difference / static_cast<double>(half) / static_cast<double>(offset);
+    const double slope = difference / static_cast<double>(half) / static_cast<double>(offset);
     for (std::size_t i = 0; i < run; ++i) y[i] -= slope * static_cast<double>(i);
     phase[0] = 0;
     for (std::size_t i = 0; i < 3 * run; ++i) {
@@ -122,8 +121,7 @@ Variance hadamard_total_variance(const std::vector<double>& x, std::size_t m) {
     // 6m differences that start within the extended run.
     double sum = 0;
     for (std::size_t i = 0; i < 2 * run; ++i) {
-      const double d =
-          phase[i + 3 * m] - 3 * (phase[i + 2 * m] - phase[i + m]) - phase[i];
+      const double d = phase[i + 3 * m] - 3 * (phase[i + 2 * m] - phase[i + m]) - phase[i];
       sum += d * d;
     }
     result.sum += sum / static_cast<double>(2 * run);
@@ -174,8 +172,8 @@ std::vector<std::size_t> averaging_factors(TauSpacing spacing, std::size_t large
   } else {
     constexpr int kPoints = 100;
     for (int i = 0; i < kPoints; ++i) {
-      const auto m = static_cast<std::size_t>(
-          std::lround(std::pow(static_cast<double>(largest), static_cast<double>(i) / (kPoints - 1))));
+      const auto m = static_cast<std::size_t>(std::lround(
+          std::pow(static_cast<double>(largest), static_cast<double>(i) / (kPoints - 1))));
       if (factors.empty() || m > factors.back()) factors.push_back(m);
     }
   }

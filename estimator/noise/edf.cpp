@@ -108,8 +108,7 @@ double greenhall_edf(int alpha, int d, std::size_t m_factor, std::size_t phase_p
   const double f = modified ? 1 : m;
   const double s = overlapping ? m : 1;
   const double filter_length = m / f + m * d;
-  const double count =
-      1 + std::floor(s * (static_cast<double>(phase_points) - filter_length) / m);
+  const double count = 1 + std::floor(s * (static_cast<double>(phase_points) - filter_length) / m);
   if (count < 1) return 1;
   const double terms = std::min(count, (d + 1) * s);
   const double r = count / s;

@@ -1,0 +1,135 @@
+#include "estimator/noise/covariance.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+
+namespace plumbline {
+
+namespace {
+
+double duration_s(const SampleWindow& w) { return static_cast<double>(w.count) * w.step_s; }
+double begin_s(const SampleWindow& w) { return w.first_s - w.step_s; }
+double middle_s(const SampleWindow& w) { return begin_s(w) + 0.5 * duration_s(w); }
+
+/// Second antiderivative of ln|x|.
+double log_twice_integrated(double x) {
+  return x == 0 ? 0 : 0.5 * x * x * std::log(std::abs(x)) - 0.75 * x * x;
+}
+
+/// ln|t − s| averaged over t and s in two windows.
+double mean_log_distance(const SampleWindow& a, const SampleWindow& b) {
+  const double wa = duration_s(a);
+  const double wb = duration_s(b);
+  const double apart = std::abs(middle_s(b) - middle_s(a));
+  // Far apart the closed form cancels; the series is then exact to 1e-9.
+  if (apart > 100 * (wa + wb)) return std::log(apart) - (wa * wa + wb * wb) / (24 * apart * apart);
+  const double x = begin_s(b) - begin_s(a);
+  return (log_twice_integrated(x + wb) + log_twice_integrated(x - wa) - log_twice_integrated(x) -
+          log_twice_integrated(x + wb - wa)) /
+         (wa * wb);
+}
+
+}  // namespace
+
+std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses) {
+  std::vector<SampleWindow> windows;
+  windows.reserve(poses.size());
+  std::vector<double> steps;
+  double other_step = 0;  // for poses of a single sample
+  for (const Pose& pose : poses) {
+    assert(pose.count > 0 && pose.first + pose.count <= samples.size());
+    steps.clear();
+    for (std::size_t i = pose.first + 1; i < pose.first + pose.count; ++i)
+      steps.push_back(samples.t_s[i] - samples.t_s[i - 1]);
+    double step = 0;
+    if (!steps.empty()) {
+      const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+      std::nth_element(steps.begin(), middle, steps.end());
+      step = *middle;
+      other_step = step;
+    }
+    windows.push_back({samples.t_s[pose.first], step, pose.count});
+  }
+  for (SampleWindow& window : windows)
+    if (window.step_s == 0) window.step_s = other_step > 0 ? other_step : 1e-3;
+  return windows;
+}
+
+std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  std::array<Eigen::MatrixXd, kTermCount> unit;
+  unit.fill(Eigen::MatrixXd::Zero(n, n));
+  if (n == 0) return unit;
+  const double origin = begin_s(windows.front());
+  const double span = begin_s(windows.back()) + duration_s(windows.back()) - origin;
+  const double log_span = std::log(span);
+  Eigen::VectorXd time(n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    time(i) = middle_s(windows[static_cast<std::size_t>(i)]) - origin - 0.5 * span;
+
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const SampleWindow& a = windows[static_cast<std::size_t>(i)];
+    assert(a.count > 0 && a.step_s > 0);
+    const double width = duration_s(a);
+    // The increments of quantization cancel within a window but for the two ends.
+    unit[kTermQ](i, i) = 2 / (width * width);
+    unit[kTermN](i, i) = 1 / width;
+    unit[kTermB](i, i) = (log_span - mean_log_distance(a, a)) * std::numbers::inv_pi;
+    // A random walk of `count` steps, averaged, after the time up to the window.
+    const double count = static_cast<double>(a.count);
+    const double before = begin_s(a) - origin;
+    unit[kTermK](i, i) = before + a.step_s * (count + 1) * (2 * count + 1) / (6 * count);
+    const double mean_walk = before + 0.5 * a.step_s * (count + 1);
+    for (Eigen::Index j = i + 1; j < n; ++j) {
+      const SampleWindow& b = windows[static_cast<std::size_t>(j)];
+      unit[kTermB](i, j) = (log_span - mean_log_distance(a, b)) * std::numbers::inv_pi;
+      unit[kTermK](i, j) = mean_walk;
+      unit[kTermB](j, i) = unit[kTermB](i, j);
+      unit[kTermK](j, i) = unit[kTermK](i, j);
+    }
+    if (i + 1 < n) {
+      const SampleWindow& b = windows[static_cast<std::size_t>(i + 1)];
+      const bool touching = begin_s(b) - (begin_s(a) + width) < 0.5 * a.step_s;
+      if (touching) {
+        unit[kTermQ](i, i + 1) = -1 / (width * duration_s(b));
+        unit[kTermQ](i + 1, i) = unit[kTermQ](i, i + 1);
+      }
+    }
+  }
+  unit[kTermR] = time * time.transpose();
+  return unit;
+}
+
+Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<SampleWindow>& windows) {
+  const std::array<Eigen::MatrixXd, kTermCount> unit = unit_covariances(windows);
+  const NoisePowers power = noise_powers(model);
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t term = 0; term < kTermCount; ++term)
+    covariance += power(static_cast<Eigen::Index>(term)) * unit[term];
+  if (model.rounding_step > 0) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const double step_s = windows[static_cast<std::size_t>(i)].step_s;
+      const double sigma = std::sqrt(power(kTermN) / step_s);
+      covariance(i, i) += rounding_variance(model.rounding_step, sigma);
+    }
+  }
+  return covariance;
+}
+
+double rounding_variance(double step, double sigma) {
+  assert(step > 0 && sigma >= 0);
+  const double ratio = 2 * std::numbers::pi * sigma / step;
+  if (ratio < 1e-3) return step * step / 12;
+  double sum = 0;
+  for (int k = 1; k <= 10000; ++k) {
+    const double term = std::exp(-ratio * ratio * k * k) / (k * k);
+    sum += term;
+    if (term < 1e-12) break;
+  }
+  return step * step / (2 * std::numbers::pi * std::numbers::pi) * sum;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,341 @@
+#include "estimator/noise/term_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "estimator/noise/chi_squared.h"
+#include "estimator/noise/spectrum.h"
+
+namespace plumbline {
+
+namespace {
+
+constexpr int kStochastic = 4;  // Q, N, B, K; the ramp is a mean
+using Vector4 = Eigen::Matrix<double, kStochastic, 1>;
+using Matrix4 = Eigen::Matrix<double, kStochastic, kStochastic>;
+
+/// Neighbouring coefficients taken together; within a bin the density hardly changes.
+struct Bin {
+  double count = 0;
+  double square = 0;                  ///< Σc²
+  double cross = 0;                   ///< Σc·m, m the cosine coefficient of the unit ramp
+  double ramp = 0;                    ///< Σm²
+  Vector4 density = Vector4::Zero();  ///< mean variance of a coefficient per unit of power
+};
+
+/// Variance of flicker coefficient k relative to its density at that frequency: the ends of the
+/// record take a little away. Closed form with the sine integral, (2/π)(Si(πk) − (1−(−1)^k)/(πk)).
+double flicker_end_factor(std::size_t k) {
+  constexpr std::array<double, 4> kFirst = {0, 0.773669, 0.902823, 0.931095};
+  if (k < kFirst.size()) return kFirst[k];
+  const double x = std::numbers::pi * static_cast<double>(k);
+  const double sign = k % 2 == 0 ? 1 : -1;
+  return 1 - 2 / (std::numbers::pi * x) + sign * 4 / (std::numbers::pi * x * x * x);
+}
+
+Vector4 coefficient_variances(std::size_t k, std::size_t n, double rate_hz) {
+  const double angle = std::numbers::pi * static_cast<double>(k) / static_cast<double>(n);
+  const double s = 2 * std::sin(0.5 * angle);
+  const double c = 2 * std::cos(0.5 * angle);
+  // Quantization: interior increments, and the two ends that have no partner.
+  const double quantization = s * s + c * c / static_cast<double>(n);
+  return {quantization * rate_hz * rate_hz, rate_hz, flicker_end_factor(k) / s,
+          1 / (rate_hz * s * s)};
+}
+
+std::vector<Bin> make_bins(const std::vector<double>& c, double rate_hz) {
+  const std::size_t n = c.size();
+  const double nn = static_cast<double>(n);
+  std::vector<Bin> bins;
+  for (std::size_t k = 1; k < n;) {
+    const std::size_t width = std::min(std::max<std::size_t>(1, k / 32), n - k);
+    Bin bin;
+    for (std::size_t i = k; i < k + width; ++i) {
+      double m = 0;  // DCT-II of t = iT: closed form, zero for even coefficients
+      if (i % 2 == 1) {
+        const double half = 0.5 * std::numbers::pi * static_cast<double>(i) / nn;
+        m = -std::sqrt(2 / nn) * std::cos(half) / (2 * std::pow(std::sin(half), 2)) / rate_hz;
+      }
+      bin.square += c[i] * c[i];
+      bin.cross += c[i] * m;
+      bin.ramp += m * m;
+    }
+    bin.count = static_cast<double>(width);
+    // Simpson's rule over the bin is exact enough for densities that change by a few per cent.
+    const Vector4 first = coefficient_variances(k, n, rate_hz);
+    const Vector4 last = coefficient_variances(k + width - 1, n, rate_hz);
+    const Vector4 middle = 0.5 * (coefficient_variances(k + (width - 1) / 2, n, rate_hz) +
+                                  coefficient_variances(k + width / 2, n, rate_hz));
+    bin.density = (first + 4 * middle + last) / 6;
+    bins.push_back(bin);
+    k += width;
+  }
+  return bins;
+}
+
+struct Slope {
+  double value = 0;
+  double variance = 0;
+};
+
+Slope fit_slope(const std::vector<Bin>& bins, const Vector4& power) {
+  double cross = 0;
+  double ramp = 0;
+  for (const Bin& bin : bins) {
+    const double variance = bin.density.dot(power);
+    cross += bin.cross / variance;
+    ramp += bin.ramp / variance;
+  }
+  return {cross / ramp, 1 / ramp};
+}
+
+double bin_square(const Bin& bin, const Slope& slope) {
+  return std::max(0.0, bin.square - slope.value * (2 * bin.cross - slope.value * bin.ramp));
+}
+
+/// −2 ln of the restricted likelihood.
+double deviance(const std::vector<Bin>& bins, const Vector4& power) {
+  const Slope slope = fit_slope(bins, power);
+  double sum = -std::log(slope.variance);
+  for (const Bin& bin : bins) {
+    const double variance = bin.density.dot(power);
+    sum += bin.count * std::log(variance) + bin_square(bin, slope) / variance;
+  }
+  return sum;
+}
+
+/// min θ'Aθ/2 − b'θ over θ ≥ 0: the best of all choices of terms at zero.
+Vector4 nonnegative_solution(const Matrix4& a, const Vector4& b, unsigned allowed) {
+  Vector4 best = Vector4::Zero();
+  double best_value = std::numeric_limits<double>::infinity();
+  for (unsigned subset = 1; subset < (1U << kStochastic); ++subset) {
+    if ((subset & ~allowed) != 0) continue;
+    std::array<int, kStochastic> index{};
+    int size = 0;
+    for (int i = 0; i < kStochastic; ++i)
+      if ((subset >> i & 1U) != 0) index[static_cast<std::size_t>(size++)] = i;
+    Eigen::MatrixXd reduced(size, size);
+    Eigen::VectorXd right(size);
+    for (int i = 0; i < size; ++i) {
+      right(i) = b(index[static_cast<std::size_t>(i)]);
+      for (int j = 0; j < size; ++j)
+        reduced(i, j) = a(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(j)]);
+    }
+    // Powers differ by many decades: scale to a unit diagonal.
+    const Eigen::VectorXd scale = reduced.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced * scale.asDiagonal();
+    const Eigen::VectorXd solution =
+        scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right)));
+    if (!solution.allFinite() || solution.minCoeff() < 0) continue;
+    const double value = 0.5 * solution.dot(reduced * solution) - right.dot(solution);
+    if (value < best_value) {
+      best_value = value;
+      best.setZero();
+      for (int i = 0; i < size; ++i) best(index[static_cast<std::size_t>(i)]) = solution(i);
+    }
+  }
+  return best;
+}
+
+struct Maximum {
+  Vector4 power = Vector4::Zero();
+  double deviance = std::numeric_limits<double>::infinity();
+  bool converged = false;
+};
+
+/// Fisher scoring with the constraint of nonnegative powers, for the terms in the bit mask
+/// `allowed`; `fixed` is added to them.
+Maximum maximise(const std::vector<Bin>& bins, unsigned allowed, const Vector4& start,
+                 const Vector4& fixed) {
+  constexpr int kIterations = 200;
+  Maximum now;
+  now.power = start;
+  now.deviance = deviance(bins, start + fixed);
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const Vector4 total = now.power + fixed;
+    const Slope slope = fit_slope(bins, total);
+    Matrix4 a = Matrix4::Zero();
+    Vector4 b = Vector4::Zero();
+    for (const Bin& bin : bins) {
+      const double variance = bin.density.dot(total);
+      const double weight = 1 / (variance * variance);
+      // The slope's own variance gives back the degree of freedom it took.
+      const double square = bin_square(bin, slope) + slope.variance * bin.ramp;
+      a.noalias() += bin.count * weight * bin.density * bin.density.transpose();
+      b.noalias() += weight * (square - bin.count * bin.density.dot(fixed)) * bin.density;
+    }
+    const Vector4 target = nonnegative_solution(a, b, allowed);
+    double step = 1;
+    Maximum next;
+    for (; step > 1e-4; step *= 0.5) {
+      next.power = now.power + step * (target - now.power);
+      const Vector4 candidate = next.power + fixed;
+      if (!((candidate.array() * bins.back().density.array()).sum() > 0)) continue;
+      next.deviance = deviance(bins, candidate);
+      if (next.deviance <= now.deviance) break;
+    }
+    if (!(next.deviance <= now.deviance)) {
+      now.converged = true;  // no descent left but rounding
+      break;
+    }
+    const double gained = now.deviance - next.deviance;
+    now.power = next.power;
+    now.deviance = next.deviance;
+    if (gained < 1e-7) {
+      now.converged = true;
+      break;
+    }
+  }
+  return now;
+}
+
+/// Starting powers: the whole density explained by each term alone at the place where it rules.
+Vector4 starting_powers(const std::vector<Bin>& bins, unsigned allowed) {
+  Vector4 power = Vector4::Zero();
+  for (int i = 0; i < kStochastic; ++i) {
+    if ((allowed >> i & 1U) == 0) continue;
+    double smallest = std::numeric_limits<double>::infinity();
+    for (std::size_t begin = 0; begin + 8 <= bins.size(); begin += 8) {
+      double square = 0;
+      double density = 0;
+      for (std::size_t j = begin; j < begin + 8; ++j) {
+        square += bins[j].square;
+        density += bins[j].count * bins[j].density(i);
+      }
+      smallest = std::min(smallest, square / density);
+    }
+    power(i) = 0.5 * smallest;
+  }
+  return power;
+}
+
+/// Expected information about the powers, less what the slope takes.
+Matrix4 fisher_information(const std::vector<Bin>& bins, const Vector4& power) {
+  Matrix4 plain = Matrix4::Zero();
+  Matrix4 mixed = Matrix4::Zero();
+  Vector4 single = Vector4::Zero();
+  const Slope slope = fit_slope(bins, power);
+  for (const Bin& bin : bins) {
+    const double variance = bin.density.dot(power);
+    const Matrix4 outer = bin.density * bin.density.transpose();
+    plain += bin.count / (variance * variance) * outer;
+    mixed += bin.ramp / (variance * variance * variance) * outer;
+    single += bin.ramp / (variance * variance) * bin.density;
+  }
+  return 0.5 * (plain - 2 * slope.variance * mixed +
+                slope.variance * slope.variance * single * single.transpose());
+}
+
+/// Power of term i at which the profile deviance has risen by 2.71 (one-sided 95 %).
+double upper_power(const std::vector<Bin>& bins, int term, const Maximum& best, double scale) {
+  const double limit = best.deviance + 2.7055;
+  const auto others = static_cast<unsigned>(0xF & ~(1U << term));
+  const auto profile = [&](double power) {
+    Vector4 fixed = Vector4::Zero();
+    fixed(term) = power;
+    Vector4 start = best.power;
+    start(term) = 0;
+    return maximise(bins, others, start, fixed).deviance;
+  };
+  double low = best.power(term);
+  double high = low + std::max(scale, 1e-3 * low);
+  int doublings = 0;
+  while (profile(high) < limit && doublings++ < 40) {
+    low = high;
+    high = best.power(term) + 2 * (high - best.power(term));
+  }
+  for (int i = 0; i < 20; ++i) {
+    const double middle = 0.5 * (low + high);
+    (profile(middle) < limit ? low : high) = middle;
+  }
+  return high;
+}
+
+void judge_fit(const std::vector<double>& c, const std::vector<Bin>& bins, const Vector4& power,
+               const Slope& slope, double rate_hz, TermFit& fit) {
+  // Bins of at least 8 coefficients, so that each is nearly normal after the cube root.
+  double count = 0;
+  double ratio = 0;
+  int used = 0;
+  for (const Bin& bin : bins) {
+    count += bin.count;
+    ratio += bin_square(bin, slope) / bin.density.dot(power);
+    if (count < 8) continue;
+    const double s = 2 / (9 * count);
+    const double z = (std::cbrt(ratio / count) - (1 - s)) / std::sqrt(s);
+    fit.chi2 += z * z;
+    ++used;
+    count = 0;
+    ratio = 0;
+  }
+  int parameters = 1;
+  for (int i = 0; i < kStochastic; ++i) parameters += power(i) > 0 ? 1 : 0;
+  fit.dof = std::max(1, used - parameters);
+
+  // A line puts its power into one or two neighbouring coefficients.
+  const std::size_t n = c.size();
+  double strongest = 0;
+  std::size_t where = 0;
+  std::size_t next = 1;  // first coefficient of the following bin
+  for (const Bin& bin : bins) {
+    const double variance = bin.density.dot(power);
+    const std::size_t end = next + static_cast<std::size_t>(bin.count);
+    if (next >= 16) {
+      for (std::size_t k = next; k < end; ++k) {
+        if (c[k] * c[k] > strongest * variance) {
+          strongest = c[k] * c[k] / variance;
+          where = k;
+        }
+      }
+    }
+    next = end;
+  }
+  const double single = normal_two_sided_tail(std::sqrt(strongest));
+  fit.line = single * static_cast<double>(n) < 1e-3;
+  fit.line_hz = static_cast<double>(where) * rate_hz / (2 * static_cast<double>(n));
+  double energy = 0;
+  for (std::size_t k = where > 3 ? where - 3 : 1; k <= where + 3 && k < n; ++k)
+    energy += c[k] * c[k];
+  fit.line_amplitude = std::sqrt(2 * energy / static_cast<double>(n));
+}
+
+}  // namespace
+
+TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
+  assert(record.size() >= 32 && rate_hz > 0);
+  const std::vector<double> c = cosine_transform(record);
+  const std::vector<Bin> bins = make_bins(c, rate_hz);
+  constexpr unsigned kAll = (1U << kStochastic) - 1;
+  const Maximum best = maximise(bins, kAll, starting_powers(bins, kAll), Vector4::Zero());
+
+  TermFit fit;
+  fit.converged = best.converged;
+  fit.power.head<kStochastic>() = best.power;
+  const Slope slope = fit_slope(bins, best.power);
+  fit.power(kTermR) = slope.value * slope.value;
+  fit.ramp_u = std::sqrt(slope.variance);
+  fit.gain(kTermR) = slope.value * slope.value / slope.variance;
+  const double ramp_limit = std::abs(slope.value) + 1.645 * fit.ramp_u;
+  fit.upper_power(kTermR) = ramp_limit * ramp_limit;
+  const Matrix4 information = fisher_information(bins, best.power);
+  fit.information.topLeftCorner<kStochastic, kStochastic>() = information;
+  for (int i = 0; i < kStochastic; ++i) {
+    Vector4 start = best.power;
+    start(i) = 0;
+    const auto others = kAll & ~(1U << i);
+    if (!(start.maxCoeff() > 0)) start = starting_powers(bins, others);
+    if (best.power(i) > 0)
+      fit.gain(i) =
+          std::max(0.0, maximise(bins, others, start, Vector4::Zero()).deviance - best.deviance);
+    fit.upper_power(i) = upper_power(bins, i, best, 1 / std::sqrt(information(i, i)));
+  }
+  judge_fit(c, bins, best.power, slope, rate_hz, fit);
+  return fit;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,34 @@
+// The five noise terms fitted together to the cosine spectrum of a record.
+#pragma once
+
+#include <vector>
+
+#include "estimator/noise/noise_model.h"
+
+namespace plumbline {
+
+/// Maximum (restricted) Whittle likelihood of Q, N, B, K ≥ 0 and the ramp.
+struct TermFit {
+  NoisePowers power = NoisePowers::Zero();                  ///< [Q² N² B² K² R²]
+  double ramp_u = 0;                                        ///< standard uncertainty of the slope R
+  NoisePowerMatrix information = NoisePowerMatrix::Zero();  ///< Fisher, about the powers; R zero
+  /// Gain in 2·ln likelihood by having the term; for the ramp the squared slope over its variance.
+  NoisePowers gain = NoisePowers::Zero();
+  NoisePowers upper_power = NoisePowers::Zero();  ///< 95 % upper limits, of the squares
+  double chi2 = 0;  ///< of the smoothed spectrum about the fit, one value a bin
+  double dof = 0;
+  bool line = false;          ///< a single frequency stands out
+  double line_hz = 0;         ///< the strongest one
+  double line_amplitude = 0;  ///< of the sine, U
+  bool converged = false;
+};
+
+/// Fits a record of at least 32 samples (precondition). Spectral densities of the sampled terms,
+/// two-sided, T = 1/rate, s = 2·sin(πfT):
+///   Q: Q²s²/T,  N: N²,  B: B²T/s,  K: K²T²/s²,
+/// the densities of IEEE Std 952 with aliasing: differenced, fractionally and once summed white
+/// noise. The ramp is a straight line, estimated by generalised least squares in the same fit;
+/// the degree of freedom it takes is accounted for (restricted likelihood).
+TermFit fit_terms(const std::vector<double>& record, double rate_hz);
+
+}  // namespace plumbline
