@@ -139,15 +139,14 @@ TEST_F(Csv, AFileThatCannotBeReadIsRefused) {
 
 TEST_F(Csv, BadRowsAreSkippedAndCountedOnRequest) {
   const CsvOptions options{.skip_bad_rows = true};
-  const auto set = read_samples(file(std::string(kHeader) +
-                                     "0,0,0,0,1,2,3\n"
-                                     "x,0,0,0,1,2,3\n"     // not a number
-                                     "1,0,0,0,1,2\n"       // too short
-                                     "-1,0,0,0,1,2,3\n"    // time backwards
-                                     "2,0,9,0,1,2,3\n"     // angle changes
-                                     "3,1,10,0,4,5,6\n"
-                                     "4,0,0,0,1,2,3\n"     // pose comes back
-                                     "5,1,10,0,7,8,9\n"),
+  const auto set = read_samples(file(std::string(kHeader) + "0,0,0,0,1,2,3\n"
+                                                            "x,0,0,0,1,2,3\n"   // not a number
+                                                            "1,0,0,0,1,2\n"     // too short
+                                                            "-1,0,0,0,1,2,3\n"  // time backwards
+                                                            "2,0,9,0,1,2,3\n"   // angle changes
+                                                            "3,1,10,0,4,5,6\n"
+                                                            "4,0,0,0,1,2,3\n"  // pose comes back
+                                                            "5,1,10,0,7,8,9\n"),
                                 options);
   ASSERT_TRUE(set) << set.error().message;
   EXPECT_EQ(set->skipped_rows, 5u);
@@ -165,7 +164,8 @@ TEST_F(Csv, AScalarSetNeedsNeitherAnglesNorPoses) {
   EXPECT_FALSE(set->has_angles);
   EXPECT_TRUE(set->poses.empty());
   EXPECT_THAT(set->samples.u_V[2], ElementsAre(3, 6));
-  const CsvOptions timed{.axis_columns = {"ax_g", "ay_g", "az_g"}, .angle_free = true, .rate_hz = 4};
+  const CsvOptions timed{
+      .axis_columns = {"ax_g", "ay_g", "az_g"}, .angle_free = true, .rate_hz = 4};
   const auto posed = read_samples(file("pose,ax_g,ay_g,az_g\n1,1,2,3\n1,1,2,3\n2,4,5,6\n"), timed);
   ASSERT_TRUE(posed) << posed.error().message;
   EXPECT_FALSE(posed->has_angles);
@@ -203,8 +203,8 @@ TEST_F(Csv, ReadsNamedColumnsOfAForeignFileAlsoCompressed) {
 
 TEST_F(Csv, WhatIsWrittenReadsBackToTheSameBits) {
   rc::check([&] {
-    const auto number = rc::gen::suchThat(rc::gen::arbitrary<double>(),
-                                          [](double x) { return std::isfinite(x); });
+    const auto number =
+        rc::gen::suchThat(rc::gen::arbitrary<double>(), [](double x) { return std::isfinite(x); });
     MeasurementSet set;
     const auto poses = *rc::gen::inRange<std::size_t>(1, 5);
     double t_s = *rc::gen::map(rc::gen::inRange(0, 1000000), [](int i) { return i / 7.0; });
