@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <system_error>
 
 namespace plumbline::storage {
@@ -65,6 +66,7 @@ void Statement::bind_at(int index, Bytes value) {
 }
 
 Result<bool> Statement::step() {
+  errno = 0;
   const int code =
       bind_failure_ == SQLITE_OK ? sqlite3_step(statement_.get()) : std::exchange(bind_failure_, 0);
   if (code == SQLITE_ROW) return true;
@@ -126,6 +128,7 @@ Result<Statement> Database::prepare(std::string_view sql) const {
 }
 
 Result<void> Database::execute(const std::string& script) const {
+  errno = 0;
   const int code = sqlite3_exec(connection_, script.c_str(), nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) return failure_of(code);
   return {};
@@ -147,10 +150,13 @@ tl::unexpected<Error> Database::failure(const std::string& text) const {
 }
 
 tl::unexpected<Error> Database::failure_of(int code) const {
+  const int last_errno = errno;
   if ((code & 0xff) == SQLITE_NOTADB) return failure("is not an SQLite database");
   std::string text = connection_ == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(connection_);
   const int primary = code & 0xff;
-  const int os_error = connection_ == nullptr ? 0 : sqlite3_system_errno(connection_);
+  // SQLite keeps errno itself, except for what fails in a COMMIT; there errno is still as it was.
+  int os_error = connection_ == nullptr ? 0 : sqlite3_system_errno(connection_);
+  if (os_error == 0) os_error = last_errno;
   if (os_error != 0 &&
       (primary == SQLITE_IOERR || primary == SQLITE_FULL || primary == SQLITE_CANTOPEN)) {
     text += fmt::format(" ({})", std::generic_category().message(os_error));
