@@ -1,0 +1,92 @@
+// Kalman filter of one axis: the four parameters and four states that carry the coloured noise
+// (Kostyuk & Lakoza 2012, eq. 13–17, corrected).
+#pragma once
+
+#include <Eigen/Core>
+
+#include "estimator/calibrate.h"
+#include "estimator/noise/noise_model.h"
+
+namespace plumbline {
+
+/// Places of the states. Only U0, d_fn, d_rw and v1 are seen together by the measurement; v2 is the
+/// derivative of v1 and is not.
+enum EightState : Eigen::Index {
+  kStateKx,
+  kStateKy,
+  kStateKz,
+  kStateU0,
+  kStateFlicker,
+  kStateRandomWalk,
+  kStateRamp,
+  kStateRampRate,
+  kEightStateCount
+};
+
+struct EightStateOptions {
+  /// Prior of [K_ix K_iy K_iz U_i0]: wide enough to leave no trace after a few poses, finite so that
+  /// the covariance keeps its digits.
+  Eigen::Vector4d prior_mean = Eigen::Vector4d::Zero();
+  Eigen::Vector4d prior_sd{1.0, 1.0, 1.0, 10.0};
+  /// Random walk of the four parameters, V/g/√s and V/√s. Zero: the parameters are constants and
+  /// the filter forgets nothing.
+  Eigen::Vector4d parameter_walk = Eigen::Vector4d::Zero();
+  /// Correlation time of the first-order Gauss-Markov process that stands in for flicker noise.
+  double flicker_correlation_s = 100.0;
+  /// Natural frequency of the second-order process that carries the ramp.
+  double ramp_frequency_rad_s = 1e-3;
+};
+
+/// What one measurement brought.
+struct Innovation {
+  double value_V = 0;
+  double variance_V2 = 0;
+  /// Normalised innovation squared; χ² with one degree of freedom when the model holds.
+  double nis() const { return value_V * value_V / variance_V2; }
+};
+
+/// Linear in all eight states. Time steps may be uneven; each is discretised exactly: the three
+/// noise processes and the parameters do not act on each other, so the matrix exponential is block
+/// diagonal and Van Loan's integral is taken for each block.
+class EightStateFilter {
+ public:
+  using State = Eigen::Matrix<double, kEightStateCount, 1>;
+  using Covariance = Eigen::Matrix<double, kEightStateCount, kEightStateCount>;
+
+  /// `noise` in V; its white and quantization terms are not states but belong to the variance that
+  /// update() is given. Terms that are not present have no variance and stay at zero.
+  EightStateFilter(const NoiseModel& noise, const EightStateOptions& options, double start_s);
+
+  /// Carries state and covariance to time t_s ≥ the last one.
+  void predict(double t_s);
+
+  /// Takes a voltage measured at the predicted time under specific force a_g (standard g, sensor
+  /// frame), with the variance of its uncorrelated error. Joseph form.
+  Innovation update(const Eigen::Vector3d& a_g, double voltage_V, double variance_V2);
+
+  const State& state() const { return x_; }
+  const Covariance& covariance() const { return P_; }
+  AxisEstimate parameters() const;
+
+ private:
+  /// Transition over one time step and the noise that enters during it.
+  struct Step {
+    double dt_s = -1;
+    Covariance F;
+    Covariance Q;
+  };
+  Step discretise(double dt_s) const;
+
+  double flicker_rate_per_s_ = 0;
+  double flicker_density_ = 0;  ///< driving density, V²/s
+  double walk_density_ = 0;     ///< V²/s
+  double ramp_density_ = 0;     ///< V²/s³
+  double ramp_frequency_ = 0;
+  Eigen::Vector4d parameter_density_;
+  double t_s_ = 0;
+  State x_;
+  Covariance P_;
+  Step step_;
+};
+
+}  // namespace plumbline

@@ -1,0 +1,21 @@
+// What the head does to the triad: angles of the dividing head to specific force in the sensor
+// frame.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace plumbline {
+
+/// Specific force at rest in the sensor frame, in standard g, and how it changes with the angles.
+struct SpecificForce {
+  Eigen::Vector3d a_g;
+  Eigen::Vector3d d_delta_g_per_rad;  ///< ∂a/∂δ
+  Eigen::Vector3d d_h_g_per_rad;      ///< ∂a/∂h
+};
+
+/// a(δ, h) = γ·(cos h cos δ, −cos h sin δ, sin h): the plumb line seen by a triad whose z axis lies
+/// along the spindle, x up at δ = h = 0 (Kostyuk & Lakoza 2012, experiment). `gamma` is local
+/// gravity over standard gravity. Degrees become radians here and nowhere else.
+SpecificForce specific_force(double delta_deg, double h_deg, double gamma);
+
+}  // namespace plumbline
