@@ -38,10 +38,12 @@ Decision decide(double limit_mps2, double max_abs_error_mps2, double u_mps2) {
                           : DecisionStatus::fail;
   }
   decision.rule =
-      "The largest absolute error of a pose that took no part in the fit is compared with the limit "
+      "The largest absolute error of a pose that took no part in the fit is compared with the "
+      "limit "
       "under a guard band equal to its expanded uncertainty (k = 2): pass if the error plus the "
       "guard band is within the limit, fail if the error minus the guard band is beyond it, "
-      "conditional pass or conditional fail in between, by the side on which the error itself lies.";
+      "conditional pass or conditional fail in between, by the side on which the error itself "
+      "lies.";
   return decision;
 }
 

@@ -43,8 +43,6 @@ std::vector<PoseMean> pose_means(const MeasurementSet& set) {
     const std::span<const double> t_s = window(samples.t_s);
     mean.t_arrival_s = t_s.front();
     mean.t_mean_s = moments(t_s).mean;
-    if (pose.count > 1)
-      mean.step_s = (t_s.back() - t_s.front()) / static_cast<double>(pose.count - 1);
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       const Moments voltage = moments(window(samples.u_V[axis]));
       mean.mean_V[axis] = voltage.mean;
@@ -57,18 +55,11 @@ std::vector<PoseMean> pose_means(const MeasurementSet& set) {
   return result;
 }
 
-PerAxis<double> pooled_variance_V2(const std::vector<PoseMean>& poses) {
-  PerAxis<double> squares{};
-  double freedom = 0;
-  for (const PoseMean& mean : poses) {
-    const double dof = static_cast<double>(mean.pose.count) - 1;
-    freedom += dof;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      squares[axis] += dof * mean.sd_V[axis] * mean.sd_V[axis];
-  }
-  if (freedom > 0)
-    for (double& value : squares) value /= freedom;
-  return squares;
+Eigen::VectorXd mean_voltages(const std::vector<PoseMean>& poses, std::size_t axis) {
+  Eigen::VectorXd result(static_cast<Eigen::Index>(poses.size()));
+  for (std::size_t row = 0; row < poses.size(); ++row)
+    result(static_cast<Eigen::Index>(row)) = poses[row].mean_V[axis];
+  return result;
 }
 
 }  // namespace plumbline

@@ -27,7 +27,8 @@ EightStateFilter::EightStateFilter(const NoiseModel& noise, const EightStateOpti
       parameter_density_(options.parameter_walk.cwiseAbs2()),
       t_s_(start_s) {
   assert(options.flicker_correlation_s > 0 && options.ramp_frequency_rad_s > 0);
-  const double plateau_V = coefficient(noise.B) * std::sqrt(2.0 * std::numbers::ln2 / std::numbers::pi);
+  const double plateau_V =
+      coefficient(noise.B) * std::sqrt(2.0 * std::numbers::ln2 / std::numbers::pi);
   const double flicker_variance = squared(plateau_V / kGaussMarkovPeak);
   flicker_density_ = 2.0 * flicker_rate_per_s_ * flicker_variance;
   const double slope_V_per_s = coefficient(noise.R);
@@ -51,8 +52,8 @@ EightStateFilter::Step EightStateFilter::discretise(double dt_s) const {
 
   const double decay = std::exp(-flicker_rate_per_s_ * dt_s);
   step.F(kStateFlicker, kStateFlicker) = decay;
-  step.Q(kStateFlicker, kStateFlicker) =
-      -flicker_density_ / (2.0 * flicker_rate_per_s_) * std::expm1(-2.0 * flicker_rate_per_s_ * dt_s);
+  step.Q(kStateFlicker, kStateFlicker) = -flicker_density_ / (2.0 * flicker_rate_per_s_) *
+                                         std::expm1(-2.0 * flicker_rate_per_s_ * dt_s);
   step.Q(kStateRandomWalk, kStateRandomWalk) = walk_density_ * dt_s;
 
   // Van Loan (1978): exp([−A G; 0 Aᵀ]·dt) = [· A⁻G; 0 Φᵀ].

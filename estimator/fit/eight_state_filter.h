@@ -24,8 +24,8 @@ enum EightState : Eigen::Index {
 };
 
 struct EightStateOptions {
-  /// Prior of [K_ix K_iy K_iz U_i0]: wide enough to leave no trace after a few poses, finite so that
-  /// the covariance keeps its digits.
+  /// Prior of [K_ix K_iy K_iz U_i0]: wide enough to leave no trace after a few poses, finite so
+  /// that the covariance keeps its digits.
   Eigen::Vector4d prior_mean = Eigen::Vector4d::Zero();
   Eigen::Vector4d prior_sd{1.0, 1.0, 1.0, 10.0};
   /// Random walk of the four parameters, V/g/√s and V/√s. Zero: the parameters are constants and

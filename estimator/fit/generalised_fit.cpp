@@ -35,8 +35,7 @@ Eigen::JacobiSVD<Eigen::MatrixXd> scaled_svd(const Eigen::MatrixXd& design) {
 std::string undetermined_directions(const Eigen::MatrixXd& design, int rank) {
   if (design.rows() == 1) return "all parameters: there is only one pose";
   const double tolerance = kRankTolerance * std::sqrt(static_cast<double>(design.rows()));
-  const Eigen::RowVectorXd spread =
-      (design.rowwise() - design.row(0)).colwise().norm();
+  const Eigen::RowVectorXd spread = (design.rowwise() - design.row(0)).colwise().norm();
   if (spread.maxCoeff() < tolerance) return "all parameters: all poses are equal";
 
   std::string text;
@@ -138,8 +137,8 @@ Eigen::VectorXd heldout_residuals_V(const Eigen::MatrixXd& A, const Eigen::Vecto
     if (rank_of(scaled_svd(A(rest, Eigen::all)).singularValues()) < 4) continue;
 
     const Eigen::MatrixXd weighted = V_inverse_A(block, Eigen::all);
-    const Eigen::MatrixXd Z_BB = V_inverse(block, block) -
-                                 weighted * fit->estimate.covariance * weighted.transpose();
+    const Eigen::MatrixXd Z_BB =
+        V_inverse(block, block) - weighted * fit->estimate.covariance * weighted.transpose();
     const Eigen::VectorXd d = Z_BB.llt().solve(Z_y(block));
     const Eigen::Vector4d x = fit->estimate.value - fit->gain(Eigen::all, block) * d;
     residuals(block) = y(block) - A(block, Eigen::all) * x;

@@ -20,11 +20,11 @@ Observability observability(const Eigen::MatrixXd& design);
 
 /// One axis. n poses.
 struct GeneralisedFit {
-  AxisEstimate estimate;           ///< covariance from the given V alone
-  Eigen::VectorXd residual_V;      ///< n, measured − fitted
+  AxisEstimate estimate;                   ///< covariance from the given V alone
+  Eigen::VectorXd residual_V;              ///< n, measured − fitted
   Eigen::MatrixXd residual_covariance_V2;  ///< n × n, V − A·C·Aᵀ: what V alone leaves after the fit
-  Eigen::MatrixXd gain;            ///< 4 × n, estimate = gain·y
-  Eigen::MatrixXd whitened;        ///< n × 5, L⁻¹·[A y] with V = L·Lᵀ, for the recursive form
+  Eigen::MatrixXd gain;                    ///< 4 × n, estimate = gain·y
+  Eigen::MatrixXd whitened;  ///< n × 5, L⁻¹·[A y] with V = L·Lᵀ, for the recursive form
   Eigen::VectorXd whitened_residual;  ///< n, L⁻¹·residual
 };
 

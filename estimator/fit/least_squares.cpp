@@ -28,8 +28,8 @@ Refined solve_refined(const Eigen::MatrixXd& A, const Eigen::VectorXd& b, const 
   for (int pass = 0; pass < 2; ++pass) {
     const Eigen::VectorXd f = (b_ext - r - A_ext * x).cast<double>();
     const Eigen::VectorXd g = (-(A_ext.transpose() * r)).cast<double>();
-    const Eigen::VectorXd h = R.transpose().triangularView<Eigen::Lower>().solve(
-        qr.colsPermutation().transpose() * g);
+    const Eigen::VectorXd h =
+        R.transpose().triangularView<Eigen::Lower>().solve(qr.colsPermutation().transpose() * g);
     Eigen::VectorXd d = qr.householderQ().adjoint() * f;
     const Eigen::VectorXd dx = R.triangularView<Eigen::Upper>().solve(d.head(p) - h);
     d.head(p) = h;

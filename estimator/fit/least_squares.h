@@ -13,12 +13,12 @@ struct LeastSquaresOptions {
 
 /// Result of min |A x − b|. n observations, p parameters.
 struct LeastSquaresResult {
-  Eigen::VectorXd x;                     ///< p; the shortest solution when rank < p
-  Eigen::MatrixXd cofactor;              ///< p × p, (AᵀA)⁻¹ from R; empty when rank < p
-  Eigen::VectorXd residual;              ///< n, b − A x
+  Eigen::VectorXd x;         ///< p; the shortest solution when rank < p
+  Eigen::MatrixXd cofactor;  ///< p × p, (AᵀA)⁻¹ from R; empty when rank < p
+  Eigen::VectorXd residual;  ///< n, b − A x
   double residual_sum_of_squares = 0;
   Eigen::Index rank = 0;
-  Eigen::Index degrees_of_freedom = 0;   ///< n − rank
+  Eigen::Index degrees_of_freedom = 0;  ///< n − rank
 };
 
 /// Solves with unit column norms and a column-pivoted Householder factorisation, then refines the

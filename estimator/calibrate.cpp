@@ -1,0 +1,336 @@
+#include "estimator/calibrate.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "estimator/decision.h"
+#include "estimator/diagnosis/residual_test.h"
+#include "estimator/diagnosis/verdict.h"
+#include "estimator/error_figures.h"
+#include "estimator/fit/eight_state_filter.h"
+#include "estimator/fit/generalised_fit.h"
+#include "estimator/fit/least_squares.h"
+#include "estimator/fit/recursive_least_squares.h"
+#include "estimator/kinematics.h"
+#include "estimator/noise/covariance.h"
+#include "estimator/noise/identify.h"
+#include "estimator/pose_means.h"
+
+namespace plumbline {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// What all axes share.
+struct Experiment {
+  const CalibrationInput& input;
+  std::vector<PoseMean> poses;
+  std::vector<SampleWindow> windows;
+  std::array<Eigen::MatrixXd, kTermCount> unit_covariance;  ///< of the pose means, per noise term
+  Eigen::MatrixXd A;                                        ///< n × 4
+};
+
+/// One axis on its way through the engine.
+struct AxisWork {
+  NoiseModel noise;        ///< with the powers that the run, too, supports
+  Eigen::VectorXd y;       ///< pose means, V
+  Eigen::VectorXd own_V2;  ///< variance that each pose has for itself: positioning and rounding
+  GeneralisedFit fit;
+  Eigen::MatrixXd V;
+  ResidualTestResult test;
+  bool noise_known = false;
+};
+
+double squared(double value) { return value * value; }
+
+NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
+  NoiseModel noise;
+  const SampleTable* record = input.static_record;
+  if (record != nullptr && record->size() > 1) {
+    const double duration_s = record->t_s.back() - record->t_s.front();
+    noise = identify_noise(record->u_V[axis], static_cast<double>(record->size() - 1) / duration_s);
+  } else {
+    noise = identify_noise_from_bursts(input.run.samples, input.run.poses, axis);
+  }
+  if (input.description.adc) noise.rounding_step = input.description.adc->lsb_V();
+  return noise;
+}
+
+/// Positioning errors, independent from pose to pose, seen through the sensitivities `K_V_per_g`.
+Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
+                                        const Eigen::Vector3d& K_V_per_g) {
+  constexpr double kRadiansPerArcsecond = 3.14159265358979323846 / 180.0 / 3600.0;
+  const RunDescription& description = experiment.input.description;
+  const double gamma = description.gravity.local_mps2 / kStandardGravity_mps2;
+  const double u_delta_rad = description.angles.delta_arcsec * kRadiansPerArcsecond;
+  const double u_h_rad = description.angles.h_arcsec * kRadiansPerArcsecond;
+  Eigen::VectorXd variance(experiment.A.rows());
+  for (Eigen::Index row = 0; row < variance.size(); ++row) {
+    const Pose& pose = experiment.poses[static_cast<std::size_t>(row)].pose;
+    const SpecificForce force = specific_force(pose.delta_deg, pose.h_deg, gamma);
+    variance(row) = squared(u_delta_rad * force.d_delta_g_per_rad.dot(K_V_per_g)) +
+                    squared(u_h_rad * force.d_h_g_per_rad.dot(K_V_per_g));
+  }
+  return variance;
+}
+
+/// Rounding that all samples of a dwell share. White noise of the record holds the rest of lsb²/12.
+double shared_rounding_V2(const NoiseModel& noise) {
+  if (noise.rounding_step <= 0) return 0;
+  const double white_V2 = squared(noise.N.value) * noise.rate_hz;
+  const double before_rounding_V2 = white_V2 - squared(noise.rounding_step) / 12.0;
+  return rounding_variance(noise.rounding_step, std::sqrt(std::max(before_rounding_V2, 0.0)));
+}
+
+/// Covariance of the pose means, n × n.
+Eigen::MatrixXd pose_covariance_V2(const Experiment& experiment, const NoisePowers& powers,
+                                   const Eigen::VectorXd& own_V2) {
+  Eigen::MatrixXd V = own_V2.asDiagonal();
+  for (std::size_t term = 0; term < kTermCount; ++term) {
+    const double power = powers(static_cast<Eigen::Index>(term));
+    if (power > 0) V += power * experiment.unit_covariance[term];
+  }
+  return V;
+}
+
+NoiseTerm term_of_power(double power) {
+  NoiseTerm term;
+  term.value = std::sqrt(std::max(power, 0.0));
+  term.present = power > 0;
+  return term;
+}
+
+/// The filter has to believe in the same noise as the batch fit, or their comparison says nothing.
+NoiseModel with_powers(NoiseModel noise, const NoisePowers& powers) {
+  noise.Q = term_of_power(powers(kTermQ));
+  noise.N = term_of_power(powers(kTermN));
+  noise.B = term_of_power(powers(kTermB));
+  noise.K = term_of_power(powers(kTermK));
+  noise.R = term_of_power(powers(kTermR));
+  return noise;
+}
+
+AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
+  AxisWork work;
+  work.y = mean_voltages(experiment.poses, axis);
+  const Eigen::Index n = work.y.size();
+  const LeastSquaresResult ordinary = solve_least_squares(experiment.A, work.y);
+  const Eigen::VectorXd positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
+  work.own_V2 = positioning_V2.array() + shared_rounding_V2(identified);
+
+  NoisePowers powers = noise_powers(identified);
+  if (n > 4 && powers.sum() > 0) {
+    const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
+    work.test =
+        test_residual(identified, {work.y, experiment.A, a_g, experiment.windows, positioning_V2});
+    powers = work.test.noise.power;
+  }
+  work.noise = with_powers(identified, powers);
+  work.V = pose_covariance_V2(experiment, powers, work.own_V2);
+  if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
+    work.fit = *fit;
+    work.noise_known = powers.sum() > 0;
+    return work;
+  }
+  // Nothing is known about the noise: the residual has to say how large it is.
+  const double dof = static_cast<double>(std::max<Eigen::Index>(n - 4, 1));
+  const double variance_V2 = std::max(ordinary.residual_sum_of_squares / dof, 1e-24);
+  work.V = Eigen::MatrixXd::Identity(n, n) * variance_V2;
+  work.fit = *fit_generalised(experiment.A, work.y, work.V);
+  return work;
+}
+
+/// Adds what the fit cannot see: local gravity scales all of K alike. `inflation` is the Birge
+/// ratio squared.
+AxisEstimate with_gravity(AxisEstimate estimate, const Gravity& gravity, double inflation) {
+  estimate.covariance *= inflation;
+  const double relative = gravity.u_mps2 / gravity.local_mps2;
+  const Eigen::Vector3d K = estimate.value.head<3>();
+  estimate.covariance.topLeftCorner<3, 3>() += relative * relative * K * K.transpose();
+  return estimate;
+}
+
+/// Largest E_n = |x₁ − x₂| / √(U₁² + U₂²), U = 2u, of the four parameters (ISO/IEC 17043). Both
+/// estimates use the same data, so that E_n is far below 1 unless one of them is wrong.
+double largest_en(const AxisEstimate& first, const AxisEstimate& second) {
+  const Eigen::Vector4d U =
+      2.0 * (first.covariance.diagonal() + second.covariance.diagonal()).cwiseSqrt();
+  return (first.value - second.value).cwiseAbs().cwiseQuotient(U).maxCoeff();
+}
+
+EightStateOptions filter_options(const Experiment& experiment) {
+  EightStateOptions options;
+  const double first_s = experiment.poses.front().t_arrival_s;
+  const double duration_s = experiment.poses.back().t_mean_s - first_s;
+  const double spacing_s = duration_s / static_cast<double>(experiment.poses.size());
+  // The stand-in for flicker fits about a decade: it is put in the middle of the times that the
+  // run can tell apart. The ramp is one over the whole run.
+  options.flicker_correlation_s = std::sqrt(spacing_s * duration_s);
+  options.ramp_frequency_rad_s = 1.0 / duration_s;
+  return options;
+}
+
+/// Filter, recursive and batch estimates after each pose; the last ones are those of the run.
+void follow_convergence(const Experiment& experiment, const AxisWork& work, double inflation,
+                        std::size_t axis, Convergence& convergence) {
+  constexpr double kPriorSd = 1e3;  // V/g and V: leaves a part in 1e16
+  const Gravity& gravity = experiment.input.description.gravity;
+  NoisePowers white = NoisePowers::Zero();
+  white(kTermQ) = squared(work.noise.Q.value);
+  white(kTermN) = squared(work.noise.N.value);
+  const Eigen::VectorXd white_V2 = pose_covariance_V2(experiment, white, work.own_V2).diagonal();
+
+  RecursiveLeastSquares recursive(kPriorSd);
+  EightStateFilter filter(work.noise, filter_options(experiment),
+                          experiment.poses.front().t_arrival_s);
+  for (Eigen::Index row = 0; row < experiment.A.rows(); ++row) {
+    const auto pose = static_cast<std::size_t>(row);
+    recursive.add(work.fit.whitened.row(row).head<4>(), work.fit.whitened(row, 4));
+    convergence.rls[pose][axis] = with_gravity(recursive.estimate(), gravity, inflation);
+
+    filter.predict(experiment.poses[pose].t_mean_s);
+    const double variance_V2 = work.noise_known ? white_V2(row) : work.V(row, row);
+    filter.update(experiment.A.row(row).head<3>(), work.y(row), variance_V2);
+    convergence.ekf[pose][axis] = with_gravity(filter.parameters(), gravity, inflation);
+
+    AxisEstimate batch{Eigen::Vector4d::Constant(kNan), Eigen::Matrix4d::Constant(kNan)};
+    const LeastSquaresResult so_far = solve_least_squares(
+        work.fit.whitened.topLeftCorner(row + 1, 4), work.fit.whitened.col(4).head(row + 1));
+    if (so_far.rank == 4) batch = {so_far.x, so_far.cofactor};
+    convergence.batch_ls[pose][axis] = with_gravity(batch, gravity, inflation);
+  }
+}
+
+/// Expected pose RMS under the identified noise, and its uncertainty from that of the noise terms.
+void floor_of(const Experiment& experiment, const AxisWork& work, const NoiseModel& identified,
+              double mps2_per_V, double& floor_mps2, double& u_floor_mps2) {
+  const Eigen::MatrixXd V =
+      work.noise_known ? pose_covariance_V2(experiment, noise_powers(identified), work.own_V2)
+                       : work.V;
+  const double mean_square = expected_mean_square_V2(experiment.A, work.fit.gain, V);
+  floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
+
+  const std::array<const NoiseTerm*, kTermCount> terms = {
+      &identified.Q, &identified.N, &identified.B, &identified.K, &identified.R};
+  double variance = 0;
+  for (std::size_t i = 0; i < kTermCount; ++i) {
+    if (!terms[i]->present) continue;
+    const double u_power = squared(terms[i]->value + terms[i]->u) - squared(terms[i]->value);
+    variance += squared(u_power * expected_mean_square_V2(experiment.A, work.fit.gain,
+                                                          experiment.unit_covariance[i]));
+  }
+  u_floor_mps2 = floor_mps2 > 0
+                     ? std::abs(mps2_per_V) * std::sqrt(variance) / (2.0 * std::sqrt(mean_square))
+                     : 0.0;
+}
+
+/// Errors of one axis; returns the held-out errors of both partitions one after the other.
+Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work, std::size_t axis,
+                              double mps2_per_V, ErrorFigures& errors) {
+  const MeasurementSet& run = experiment.input.run;
+  errors.fit_pose_rms_mps2[axis] = rms(mps2_per_V * work.fit.residual_V);
+  errors.sample_rms_mps2[axis] =
+      std::abs(mps2_per_V) *
+      sample_rms_V(run, experiment.input.description.gravity, work.fit.estimate, axis);
+  Eigen::VectorXd heldout(2 * work.y.size());
+  heldout << heldout_residuals_V(experiment.A, work.y, work.V, time_blocks(experiment.poses)),
+      heldout_residuals_V(experiment.A, work.y, work.V, position_blocks(experiment.poses));
+  heldout *= mps2_per_V;
+  errors.heldout_pose_rms_mps2[axis] = rms(heldout);
+  errors.heldout_pose_max_abs_mps2[axis] = max_abs(heldout);
+  return heldout;
+}
+
+}  // namespace
+
+Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /*options*/) {
+  assert(input.run.has_angles && !input.run.poses.empty());
+  Experiment experiment{input, pose_means(input.run), {}, {}, {}};
+  experiment.A = design_matrix(experiment.poses, input.description.gravity);
+
+  Calibration result;
+  result.poses = experiment.poses.size();
+  result.samples = input.run.samples.size();
+  result.skipped_rows = input.run.skipped_rows;
+  result.observability = observability(experiment.A);
+  if (result.observability.rank < 4) return result;
+
+  experiment.windows = pose_windows(input.run.samples, input.run.poses);
+  experiment.unit_covariance = unit_covariances(experiment.windows);
+  const std::size_t n = experiment.poses.size();
+  result.convergence.rls.resize(n);
+  result.convergence.ekf.resize(n);
+  result.convergence.batch_ls.resize(n);
+  result.estimates.rls.emplace();
+  result.pose_results.resize(n);
+
+  PerAxis<AxisWork> work;
+  VerdictInput verdict;
+  verdict.poses = n;
+  double worst_error_mps2 = -1;
+  double u_worst_mps2 = 0;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    result.noise[axis] = identify(input, axis);
+    work[axis] = fit_axis(experiment, result.noise[axis], axis);
+    const AxisWork& w = work[axis];
+    const double mps2_per_V = input_referred_mps2_per_V(w.fit.estimate, axis);
+    result.diagnosis.axis_test[axis] = {w.test.chi2, w.test.dof, w.test.p_value};
+
+    const Eigen::VectorXd heldout = error_figures(experiment, w, axis, mps2_per_V, result.before);
+    floor_of(experiment, w, result.noise[axis], mps2_per_V, result.floor_pose_rms_mps2[axis],
+             result.u_floor_pose_rms_mps2[axis]);
+    verdict.axis[axis] = {w.noise_known,
+                          std::isfinite(mps2_per_V),
+                          w.test.p_value,
+                          result.before.fit_pose_rms_mps2[axis],
+                          result.floor_pose_rms_mps2[axis],
+                          result.u_floor_pose_rms_mps2[axis]};
+
+    // An axis whose residual the noise does not explain is less certain than the noise says.
+    const bool unexplained = is_unexplained(verdict, axis);
+    const double inflation = unexplained ? std::max(1.0, w.test.chi2 / w.test.dof) : 1.0;
+    follow_convergence(experiment, w, inflation, axis, result.convergence);
+    result.estimates.batch_ls[axis] =
+        with_gravity(w.fit.estimate, input.description.gravity, inflation);
+    (*result.estimates.rls)[axis] = result.convergence.rls.back()[axis];
+    result.estimates.ekf[axis] = result.convergence.ekf.back()[axis];
+    result.estimates.agreement_en[axis] =
+        largest_en(result.estimates.batch_ls[axis], result.estimates.ekf[axis]);
+
+    for (Eigen::Index k = 0; k < heldout.size(); ++k) {
+      if (!(std::abs(heldout(k)) > worst_error_mps2)) continue;
+      worst_error_mps2 = std::abs(heldout(k));
+      const Eigen::Index row = k % static_cast<Eigen::Index>(n);
+      u_worst_mps2 =
+          std::abs(mps2_per_V) * std::sqrt(std::max(w.fit.residual_covariance_V2(row, row), 0.0));
+    }
+    for (std::size_t pose = 0; pose < n; ++pose) {
+      PoseResult& row = result.pose_results[pose];
+      const double residual_mps2 = mps2_per_V * w.fit.residual_V(static_cast<Eigen::Index>(pose));
+      row.residual_before_mps2[axis] = row.residual_after_mps2[axis] = residual_mps2;
+    }
+  }
+  for (std::size_t pose = 0; pose < n; ++pose) {
+    const PoseMean& mean = experiment.poses[pose];
+    PoseResult& row = result.pose_results[pose];
+    row.pose = mean.pose;
+    row.t_mean_s = mean.t_mean_s;
+    row.temp_C = mean.temp_C;
+    row.mean_V = mean.mean_V;
+    row.sd_V = mean.sd_V;
+  }
+
+  decide_verdict(verdict, result.diagnosis);
+  result.final = result.estimates;
+  result.final.rls.reset();
+  result.after = result.before;
+  if (input.description.limits && worst_error_mps2 >= 0)
+    result.decision =
+        decide(input.description.limits->max_abs_error_mps2, worst_error_mps2, u_worst_mps2);
+  return result;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,95 @@
+#include "estimator/error_figures.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "estimator/kinematics.h"
+
+namespace plumbline {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+double input_referred_mps2_per_V(const AxisEstimate& estimate, std::size_t axis) {
+  const auto i = static_cast<Eigen::Index>(axis);
+  const double scale_V_per_g = estimate.value(i);
+  // A scale factor within five of its uncertainties of zero is a dead axis, not a sensor.
+  if (std::abs(scale_V_per_g) <= 5.0 * std::sqrt(estimate.covariance(i, i))) return kNan;
+  return kStandardGravity_mps2 / scale_V_per_g;
+}
+
+double rms(const Eigen::VectorXd& values) {
+  double sum = 0;
+  int count = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    sum += value * value;
+    ++count;
+  }
+  return count > 0 ? std::sqrt(sum / count) : kNan;
+}
+
+double max_abs(const Eigen::VectorXd& values) {
+  double largest = kNan;
+  for (const double value : values)
+    if (std::isfinite(value) && !(std::abs(value) <= largest)) largest = std::abs(value);
+  return largest;
+}
+
+Blocks time_blocks(const std::vector<PoseMean>& poses) {
+  constexpr std::size_t kStretches = 10;
+  Blocks blocks(kStretches);
+  for (std::size_t row = 0; row < poses.size(); ++row)
+    blocks[row * kStretches / poses.size()].push_back(static_cast<Eigen::Index>(row));
+  std::erase_if(blocks, [](const auto& block) { return block.empty(); });
+  return blocks;
+}
+
+Blocks position_blocks(const std::vector<PoseMean>& poses) {
+  constexpr double kDeltaCell_deg = 60;
+  constexpr double kTiltCell_deg = 30;
+  std::map<std::pair<int, int>, std::vector<Eigen::Index>> cells;
+  for (std::size_t row = 0; row < poses.size(); ++row) {
+    const Pose& pose = poses[row].pose;
+    const double turn_deg = pose.delta_deg - 360.0 * std::floor(pose.delta_deg / 360.0);
+    const std::pair cell(static_cast<int>(std::floor(turn_deg / kDeltaCell_deg)),
+                         static_cast<int>(std::floor(pose.h_deg / kTiltCell_deg)));
+    cells[cell].push_back(static_cast<Eigen::Index>(row));
+  }
+  Blocks blocks;
+  for (auto& [cell, rows] : cells) blocks.push_back(std::move(rows));
+  return blocks;
+}
+
+double sample_rms_V(const MeasurementSet& set, const Gravity& gravity, const AxisEstimate& estimate,
+                    std::size_t axis) {
+  const double gamma = gravity.local_mps2 / kStandardGravity_mps2;
+  const std::vector<double>& voltage_V = set.samples.u_V[axis];
+  double sum = 0;
+  double count = 0;
+  for (const Pose& pose : set.poses) {
+    const Eigen::Vector3d a_g = specific_force(pose.delta_deg, pose.h_deg, gamma).a_g;
+    const double model_V = estimate.value.head<3>().dot(a_g) + estimate.value(3);
+    for (std::size_t i = pose.first; i < pose.first + pose.count; ++i)
+      sum += (voltage_V[i] - model_V) * (voltage_V[i] - model_V);
+    count += static_cast<double>(pose.count);
+  }
+  return std::sqrt(sum / count);
+}
+
+double expected_mean_square_V2(const Eigen::MatrixXd& A, const Eigen::MatrixXd& gain,
+                               const Eigen::MatrixXd& V) {
+  assert(A.rows() == V.rows() && gain.cols() == V.rows() && V.cols() == V.rows());
+  const Eigen::MatrixXd gain_V = gain * V;
+  const double trace = V.trace() - 2.0 * gain_V.cwiseProduct(A.transpose()).sum() +
+                       (A.transpose() * A).cwiseProduct(gain_V * gain.transpose()).sum();
+  return std::max(trace, 0.0) / static_cast<double>(V.rows());
+}
+
+}  // namespace plumbline

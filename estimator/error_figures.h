@@ -1,0 +1,40 @@
+// How large the errors are that a calibrated axis leaves, and how large noise alone would make
+// them.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "estimator/calibrate.h"
+#include "estimator/pose_means.h"
+
+namespace plumbline {
+
+/// m/s² per volt of residual: g_n / K_ii, signed. NaN for an axis that does not respond.
+double input_referred_mps2_per_V(const AxisEstimate& estimate, std::size_t axis);
+
+/// Root mean square of the finite entries; NaN when there is none.
+double rms(const Eigen::VectorXd& values);
+/// Largest magnitude of the finite entries; NaN when there is none.
+double max_abs(const Eigen::VectorXd& values);
+
+/// Poses (row numbers, ascending) that are left out together; each partition covers every pose
+/// once.
+using Blocks = std::vector<std::vector<Eigen::Index>>;
+
+/// Ten stretches of the visiting order: what drifts must be predicted, not interpolated.
+Blocks time_blocks(const std::vector<PoseMean>& poses);
+/// Cells of 60° in δ by 30° in h: what depends on position must be predicted from elsewhere.
+Blocks position_blocks(const std::vector<PoseMean>& poses);
+
+/// Root mean square over all samples of one axis of voltage − K·a − U0, V.
+double sample_rms_V(const MeasurementSet& set, const Gravity& gravity, const AxisEstimate& estimate,
+                    std::size_t axis);
+
+/// Root mean square residual of n poses that a covariance V of the pose means leaves after the fit
+/// with the given gain (4 × n): √(trace(P·V·Pᵀ)/n), P = I − A·gain. V².
+double expected_mean_square_V2(const Eigen::MatrixXd& A, const Eigen::MatrixXd& gain,
+                               const Eigen::MatrixXd& V);
+
+}  // namespace plumbline

@@ -1,1 +1,0 @@
-#include "estimator/calibrate.h"
