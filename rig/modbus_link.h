@@ -11,7 +11,7 @@
 //   - over TCP each request also carries a new transaction number.
 #pragma once
 
-#include <modbus.h>
+#include <modbus/modbus.h>
 
 #include <chrono>
 #include <cstdint>
