@@ -63,8 +63,9 @@ int read_axis(rig::StrictTable& table, FaultStage stage) {
 }
 
 Fault read_fault(rig::StrictTable& table) {
-  std::vector<std::string> names;
-  for (const KindRow& row : kKinds) names.emplace_back(row.name);
+  std::vector<std::string> names(kKinds.size());
+  std::transform(kKinds.begin(), kKinds.end(), names.begin(),
+                 [](const KindRow& row) { return row.name; });
   Fault fault;
   // No kind is a sensible default, so an absent one falls to text(), which refuses it.
   const std::string name =

@@ -4,7 +4,8 @@ namespace plumbline::sim {
 
 double Machine::catch_up() {
   const double now_s = clock_.now_s();
-  for (double t_s = unit_.next_time_s(); t_s <= now_s; t_s = unit_.next_time_s()) {
+  while (unit_.next_time_s() <= now_s) {
+    const double t_s = unit_.next_time_s();
     drive_.advance(t_s);
     samples_.push_back({unit_.next(drive_.head(t_s)), drive_.moves()});
   }
