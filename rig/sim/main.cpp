@@ -119,7 +119,7 @@ void add_record_options(CLI::App& app, Options& options) {
   };
   add("--plan", options.plan, "positions to visit, as `plumbline plan` prints them");
   add("--order", recording.order, "raster, snake, spiral or random")
-      ->transform(CLI::CheckedTransformer(orders));
+      ->transform(CLI::CheckedTransformer(orders).description(""));
   add("--samples-per-pose", recording.samples_per_pose, "samples taken at each position")
       ->check(CLI::Range(1, 1'000'000));
   add("--soak", recording.soak_s, "seconds at rest before the grid")->check(CLI::Range(0.0, 1e6));

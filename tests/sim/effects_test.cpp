@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -132,6 +133,20 @@ TEST(EffectCatalogue, HasEveryListedEffectAndManyOfItsOwn) {
     EXPECT_TRUE(ids.contains(id)) << id;
   }
   EXPECT_GE(own, 16U);
+}
+
+TEST(EffectCatalogue, IsDocumentedWithEveryParameter) {
+  std::ifstream file(PLUMBLINE_SOURCE_DIR "/rig/sim/worlds/README.md");
+  std::map<std::string, std::string> row_of;  // by the id that starts the row
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("| `")) row_of[line.substr(3, line.find('`', 3) - 3)] = line;
+  }
+  for (const EffectInfo* info : effect_catalogue()) {
+    ASSERT_TRUE(row_of.contains(info->id)) << info->id;
+    for (const ParameterInfo& p : info->parameters) {
+      EXPECT_THAT(row_of[info->id], ::testing::HasSubstr(std::string("`") + p.name + "`"));
+    }
+  }
 }
 
 TEST(EffectCatalogue, ActsOnTheNamedAxesOnly) {
