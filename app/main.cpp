@@ -58,6 +58,8 @@ int run(int argc, char** argv) {
   add_evaluate(program, invocation);
   add_noise(program, invocation);
   add_plan(program, invocation);
+  add_runs(program, invocation);
+  add_export(program, invocation);
   add_help(program, invocation);
 
   try {

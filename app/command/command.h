@@ -23,6 +23,8 @@ void add_calibrate(CLI::App& program, Invocation& invocation);
 void add_evaluate(CLI::App& program, Invocation& invocation);
 void add_noise(CLI::App& program, Invocation& invocation);
 void add_plan(CLI::App& program, Invocation& invocation);
+void add_runs(CLI::App& program, Invocation& invocation);
+void add_export(CLI::App& program, Invocation& invocation);
 void add_help(CLI::App& program, Invocation& invocation);
 
 }  // namespace plumbline::app
