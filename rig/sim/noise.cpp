@@ -39,8 +39,10 @@ ChannelNoise::ChannelNoise(const NoiseTerms& terms, double rate_hz, std::uint64_
   // the ripple about that is 0.3 %.
   if (terms.B > 0) {
     const double variance = terms.B * terms.B * std::log(kCornerRatio) / std::numbers::pi;
-    for (double corner_hz = rate_hz / 4; corner_hz > kFlickerLowest_hz; corner_hz /= kCornerRatio) {
+    double corner_hz = rate_hz / 4;
+    while (corner_hz > kFlickerLowest_hz) {
       flicker_.emplace_back(std::sqrt(variance), 1 / (2 * std::numbers::pi * corner_hz), slow_);
+      corner_hz /= kCornerRatio;
     }
   }
   ramp_V_per_s_ = slow_.sign() * terms.R;
