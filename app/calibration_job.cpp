@@ -2,15 +2,22 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "app/config/run_description.h"
+#include "app/io/csv.h"
 #include "app/io/evaluation_json.h"
 #include "app/io/output_folder.h"
 #include "app/io/result_json.h"
+#include "app/io/sha256.h"
 #include "app/summary.h"
 
 namespace plumbline::app {
 
 namespace {
+
+/// A scale factor must exceed its standard uncertainty by this factor to mean anything.
+constexpr double kLeastSignificance = 5;
 
 Result<void> check_observable(const Observability& observability, const std::string& source,
                               std::size_t poses) {
@@ -22,13 +29,109 @@ Result<void> check_observable(const Observability& observability, const std::str
                           observability.rank, observability.unobservable));
 }
 
+/// An output that does not follow the acceleration has no input-referred error.
+Result<void> check_responsive(const TriadEstimate& estimate, const std::string& source) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const auto diagonal = static_cast<Eigen::Index>(axis);
+    const double scale = estimate[axis].value[diagonal];
+    const double u = std::sqrt(estimate[axis].covariance(diagonal, diagonal));
+    if (std::abs(scale) > kLeastSignificance * u) continue;
+    return fail(
+        ErrorCode::input,
+        fmt::format("{}: output {} does not follow the acceleration (K_{}{} = {:.3g} ± {:.2g} "
+                    "V/g); is it connected?",
+                    source, kAxisName[axis], kAxisName[axis], kAxisName[axis], scale, u));
+  }
+  return {};
+}
+
 bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limits>& limits) {
   const DecisionStatus status = outcome.calibration.decision.status;
   if (status == DecisionStatus::fail || status == DecisionStatus::conditional_fail) return true;
   return outcome.verification && !within_limits(*outcome.verification, limits).value_or(true);
 }
 
+Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& outcome,
+                           OutputFolder& folder) {
+  Provenance provenance = job.provenance;
+  provenance.created_utc = utc_now();
+  const std::string result = file_text(result_json(outcome.calibration, provenance));
+  if (auto done = folder.write("result.json", result); !done) return done;
+  const std::string certificate = write_html(
+      make_certificate({.description = job.description,
+                        .calibration = outcome.calibration,
+                        .provenance = provenance,
+                        .verification = outcome.verification ? &*outcome.verification : nullptr,
+                        .events = job.events}));
+  if (auto done = folder.write("certificate.html", certificate); !done) return done;
+  if (outcome.verification) {
+    const Json json = evaluation_json(*outcome.verification, 0, job.description.limits, provenance);
+    if (auto done = folder.write("evaluation.json", file_text(json)); !done) return done;
+  }
+  return folder.publish();
+}
+
 }  // namespace
+
+Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64_t seed) {
+  CalibrationJob job;
+  job.source = files.samples.string();
+  job.provenance.seed = seed;
+  auto description = read_run_description(files.config);
+  if (!description) return fail(description.error());
+  job.description = *std::move(description);
+  job.provenance.dut = job.description.dut;
+  auto run = read_samples(files.samples, {.skip_bad_rows = files.skip_bad_rows});
+  if (!run) return fail(run.error());
+  job.run = *std::move(run);
+  if (!files.static_record.empty()) {
+    auto record = read_static(files.static_record, {.skip_bad_rows = files.skip_bad_rows});
+    if (!record) return fail(record.error());
+    job.static_record = std::move(record->samples);
+    job.run.skipped_rows += record->skipped_rows;
+  }
+  for (const auto& file : {files.samples, files.static_record, files.config}) {
+    if (file.empty()) continue;
+    auto hash = sha256_of_file(file);
+    if (!hash) return fail(hash.error());
+    job.provenance.input_sha256.emplace_back(file.string(), *std::move(hash));
+  }
+  return job;
+}
+
+Result<CalibrationJob> job_from_database(const std::filesystem::path& database, storage::RunId run,
+                                         std::uint64_t seed) {
+  CalibrationJob job;
+  job.source = fmt::format("{}, run {}", database.string(), run);
+  job.provenance.seed = seed;
+  const auto store = storage::RunStore::open_read_only(database);
+  if (!store) return fail(store.error());
+  auto stored = store->load(run);
+  if (!stored) return fail(stored.error());
+  const storage::RunSummary& summary = stored->summary;
+  auto description =
+      parse_run_description(summary.header.config_toml, job.source + ", stored configuration");
+  if (!description) return fail(description.error());
+  job.description = *std::move(description);
+  job.description.dut.serial = summary.header.serial;
+  job.provenance.dut = job.description.dut;
+  job.run = std::move(stored->grid);
+  job.static_record = std::move(stored->soak);
+  job.verification = std::move(stored->verification);
+  for (const storage::EventRecord& event : stored->events) {
+    job.events.push_back({.t_s = event.t_s, .kind = event.kind, .text = event.text});
+  }
+  if (summary.state != storage::RunState::finished) {
+    job.events.push_back({.t_s = 0,
+                          .kind = "incomplete",
+                          .text = fmt::format("the run is not finished: {} after {} poses",
+                                              storage::to_string(summary.state), summary.poses)});
+  }
+  auto hash = sha256_of_file(database);
+  if (!hash) return fail(hash.error());
+  job.provenance.input_sha256.emplace_back(database.string(), *std::move(hash));
+  return job;
+}
 
 Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesystem::path& out) {
   if (job.run.poses.empty()) return fail(ErrorCode::input, job.source + ": holds no pose");
@@ -36,14 +139,17 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
   if (!folder) return fail(folder.error());
 
   CalibrationOutcome outcome;
-  outcome.calibration = calibrate(
-      {.run = job.run,
-       .static_record = job.static_record.size() == 0 ? nullptr : &job.static_record,
-       .description = job.description},
-      {.seed = job.provenance.seed});
+  outcome.calibration =
+      calibrate({.run = job.run,
+                 .static_record = job.static_record.size() == 0 ? nullptr : &job.static_record,
+                 .description = job.description},
+                {.seed = job.provenance.seed});
   const Calibration& calibration = outcome.calibration;
   if (auto good = check_observable(calibration.observability, job.source, job.run.poses.size());
       !good) {
+    return fail(good.error());
+  }
+  if (auto good = check_responsive(calibration.estimates.batch_ls, job.source); !good) {
     return fail(good.error());
   }
   if (!job.verification.poses.empty()) {
@@ -53,19 +159,7 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
     outcome.verification = evaluate(model, job.verification, job.description);
   }
 
-  Provenance provenance = job.provenance;
-  provenance.created_utc = utc_now();
-  if (auto done = folder->write("result.json", file_text(result_json(calibration, provenance)));
-      !done) {
-    return fail(done.error());
-  }
-  if (outcome.verification) {
-    const Json json = evaluation_json(*outcome.verification, job.description.limits, provenance);
-    if (auto done = folder->write("evaluation.json", file_text(json)); !done) {
-      return fail(done.error());
-    }
-  }
-  if (auto done = folder->publish(); !done) return fail(done.error());
+  if (auto done = write_results(job, outcome, *folder); !done) return fail(done.error());
 
   outcome.exit_code =
       exceeds_limits(outcome, job.description.limits) ? ExitCode::limits_exceeded : ExitCode::done;

@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "app/certificate/certificate.h"
 #include "app/exit_code.h"
 #include "app/provenance.h"
 #include "estimator/calibrate.h"
@@ -20,8 +22,9 @@ struct CalibrationJob {
   MeasurementSet run;
   SampleTable static_record;    ///< no rows: none
   MeasurementSet verification;  ///< fresh poses off the grid; no poses: none
-  Provenance provenance;        ///< unit, input hashes, seed
-  std::string source;           ///< what was read, for messages
+  std::vector<CertificateEvent> events;
+  Provenance provenance;  ///< unit, input hashes, seed
+  std::string source;     ///< what was read, for messages
 };
 
 struct CalibrationFiles {

@@ -2,11 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "app/command/command.h"
@@ -71,7 +73,16 @@ int run(int argc, char** argv) {
     return code(ExitCode::wrong_use);
   }
   const Result<ExitCode> outcome = invocation.action();
-  if (outcome) return code(*outcome);
+  if (outcome) {
+    // A reader that has seen enough (`| head`) is no failure; a full disk is one.
+    errno = 0;
+    if (!std::cout.flush() && errno != EPIPE) {
+      complain(fmt::format("standard output: cannot write: {}",
+                           std::generic_category().message(errno)));
+      return code(ExitCode::wrong_use);
+    }
+    return code(*outcome);
+  }
   complain(outcome.error().message);
   return code(exit_code_of(outcome.error().code));
 }

@@ -1,12 +1,186 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <sstream>
+
+#include "app/certificate/rounding.h"
 #include "app/command/command.h"
+#include "app/figure/allan_figure.h"
+#include "app/io/csv.h"
+#include "app/io/noise_json.h"
+#include "app/io/output_folder.h"
+#include "app/io/sha256.h"
+#include "estimator/noise/identify.h"
 
 namespace plumbline::app {
 
+namespace {
+
+struct NoiseOptions {
+  std::string record;
+  std::string out;
+  std::string columns = "x=ux_V,y=uy_V,z=uz_V";
+  double scale = 1;
+  std::string unit;
+  double rate_hz = 0;
+};
+
+struct AxisColumn {
+  std::string axis;
+  std::string column;
+};
+
+/// "x=ax_lsb,z=az_lsb"
+Result<std::vector<AxisColumn>> parse_columns(const std::string& text) {
+  std::vector<AxisColumn> columns;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const auto equals = part.find('=');
+    const AxisColumn column{part.substr(0, equals),
+                            equals == std::string::npos ? "" : part.substr(equals + 1)};
+    const bool known =
+        std::find(kAxisName.begin(), kAxisName.end(), column.axis) != kAxisName.end();
+    const bool again = std::any_of(columns.begin(), columns.end(), [&](const AxisColumn& other) {
+      return other.axis == column.axis;
+    });
+    if (!known || again || column.column.empty()) {
+      return fail(ErrorCode::input,
+                  fmt::format("--columns: \"{}\" is not AXIS=COLUMN with each of x, y, z at most "
+                              "once",
+                              part));
+    }
+    columns.push_back(column);
+  }
+  if (columns.empty()) return fail(ErrorCode::input, "--columns names no column");
+  return columns;
+}
+
+/// The unit that a column's name ends in: "ux_V" is in V.
+std::string unit_of(const std::string& column) {
+  const auto underscore = column.rfind('_');
+  std::string suffix = underscore == std::string::npos ? "" : column.substr(underscore + 1);
+  if (suffix == "V" || suffix == "g") return suffix;
+  if (suffix == "mps2") return "m/s^2";
+  return suffix == "lsb" || suffix == "raw" ? "LSB" : "unit";
+}
+
+/// Mean rate of a record; refuses gaps, because the curves of an uneven record mean nothing.
+Result<double> rate_of(const std::string& name, const std::vector<double>& t_s) {
+  if (t_s.size() < 2) return fail(ErrorCode::input, name + ": a record needs two samples or more");
+  const double span_s = t_s.back() - t_s.front();
+  const double step_s = span_s / static_cast<double>(t_s.size() - 1);
+  for (std::size_t i = 1; i < t_s.size(); ++i) {
+    if (t_s[i] - t_s[i - 1] > 2.5 * step_s) {
+      return fail(ErrorCode::input,
+                  fmt::format("{}: gap of {:.6g} s after t_s = {:.6g} in a record sampled every "
+                              "{:.6g} s; the noise needs an even record",
+                              name, t_s[i] - t_s[i - 1], t_s[i - 1], step_s));
+    }
+  }
+  return 1 / step_s;
+}
+
+std::string summary_line(const NoiseChannel& channel) {
+  std::string line = fmt::format("{} ({}):", channel.axis, channel.column);
+  const NoiseModel& noise = channel.noise;
+  const std::pair<const char*, const NoiseTerm*> terms[] = {
+      {"Q", &noise.Q}, {"N", &noise.N}, {"B", &noise.B}, {"K", &noise.K}, {"R", &noise.R}};
+  for (const auto& [name, term] : terms) {
+    if (term->present) {
+      line +=
+          fmt::format(" {} = {} ± {}", name, significant(term->value, 3), significant(term->u, 2));
+    }
+  }
+  if (noise.source == "none") return line + " the record cannot tell\n";
+  return line + fmt::format("; these terms {}\n",
+                            noise.adequate ? "describe the record" : "do NOT describe the record");
+}
+
+Result<ExitCode> run_noise(const NoiseOptions& options) {
+  const auto columns = parse_columns(options.columns);
+  if (!columns) return fail(columns.error());
+  std::vector<std::string> names;
+  for (const AxisColumn& column : *columns) names.push_back(column.column);
+  if (options.rate_hz == 0) names.insert(names.begin(), "t_s");
+  auto record = read_columns(options.record, names);
+  if (!record) return fail(record.error());
+
+  NoiseReport report;
+  report.rate_hz = options.rate_hz;
+  report.samples = record->front().size();
+  if (options.rate_hz == 0) {
+    const auto rate = rate_of(options.record, record->front());
+    if (!rate) return fail(rate.error());
+    report.rate_hz = *rate;
+    record->erase(record->begin());
+  }
+  auto folder = OutputFolder::prepare(options.out);
+  if (!folder) return fail(folder.error());
+
+  for (std::size_t i = 0; i < columns->size(); ++i) {
+    std::vector<double>& values = (*record)[i];
+    for (double& value : values) value *= options.scale;
+    const AxisColumn& column = (*columns)[i];
+    std::string unit = options.unit;
+    if (unit.empty()) unit = options.scale == 1 ? unit_of(column.column) : "unit";
+    report.channels.push_back({.axis = column.axis,
+                               .column = column.column,
+                               .unit = unit,
+                               .noise = identify_noise(values, report.rate_hz)});
+  }
+  std::vector<AllanSeries> series;
+  for (const NoiseChannel& channel : report.channels) {
+    series.push_back({channel.axis + " (" + channel.column + ")", &channel.noise});
+  }
+  auto hash = sha256_of_file(options.record);
+  if (!hash) return fail(hash.error());
+  const Provenance provenance{
+      .dut = {}, .input_sha256 = {{options.record, *hash}}, .created_utc = utc_now()};
+  if (auto done = folder->write("noise.json", file_text(noise_json(report, provenance))); !done) {
+    return fail(done.error());
+  }
+  if (auto done = folder->write("noise.svg", allan_svg(series, report.channels.front().unit));
+      !done) {
+    return fail(done.error());
+  }
+  if (auto done = folder->publish(); !done) return fail(done.error());
+
+  std::cout << fmt::format("{} samples at {:.6g} Hz\n", report.samples, report.rate_hz);
+  for (const NoiseChannel& channel : report.channels) std::cout << summary_line(channel);
+  return ExitCode::done;
+}
+
+}  // namespace
+
 void add_noise(CLI::App& program, Invocation& invocation) {
-  CLI::App* sub = program.add_subcommand("noise", "not yet");
-  sub->callback([&invocation] {
-    invocation.action = []() -> Result<ExitCode> { return fail(ErrorCode::input, "not yet"); };
-  });
+  auto options = std::make_shared<NoiseOptions>();
+  const auto above_zero = [](const std::string& text) -> std::string {
+    double value = 0;
+    return CLI::detail::lexical_cast(text, value) && value > 0 && std::isfinite(value)
+               ? ""
+               : "must be above 0";
+  };
+  CLI::App* sub =
+      program.add_subcommand("noise", "Identify the noise of a record taken at one fixed pose");
+  sub->add_option("--static", options->record, "The record (CSV, also compressed: .csv.gz)")
+      ->required();
+  sub->add_option("--out", options->out, "Folder for noise.json and noise.svg; created when absent")
+      ->required();
+  sub->add_option("--columns", options->columns,
+                  "Which column is which axis (default x=ux_V,y=uy_V,z=uz_V); fewer than three "
+                  "axes may be named");
+  sub->add_option("--scale", options->scale, "Multiplies the columns: units per count (default 1)")
+      ->check(above_zero);
+  sub->add_option("--unit", options->unit,
+                  "Unit of the scaled columns, for the report (default: from the column's name)");
+  sub->add_option("--rate", options->rate_hz,
+                  "Sample rate in Hz; without it the record needs the column t_s")
+      ->check(above_zero);
+  sub->callback(
+      [&invocation, options] { invocation.action = [options] { return run_noise(*options); }; });
 }
 
 }  // namespace plumbline::app

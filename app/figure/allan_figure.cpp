@@ -32,6 +32,15 @@ PlotAxis decades(const std::string& label, const std::vector<double>& values) {
   return axis;
 }
 
+/// Few differences leave no finite upper limit; the band then ends at the value itself.
+std::vector<double> drawable_upper(const DeviationCurve& curve) {
+  std::vector<double> upper = curve.upper;
+  for (std::size_t i = 0; i < upper.size(); ++i) {
+    if (!std::isfinite(upper[i])) upper[i] = curve.value[i];
+  }
+  return upper;
+}
+
 void append(std::vector<double>& all, const std::vector<double>& some) {
   all.insert(all.end(), some.begin(), some.end());
 }
@@ -56,7 +65,7 @@ void draw_allan(Canvas& canvas, Point top_left, double width, double height,
   for (std::size_t i = 0; i < series.size(); ++i) {
     const NoiseModel& noise = *series[i].noise;
     const std::string color = kColors[i % kColors.size()];
-    plot.band(noise.oadev.tau_s, noise.oadev.lower, noise.oadev.upper, color, 0.2);
+    plot.band(noise.oadev.tau_s, noise.oadev.lower, drawable_upper(noise.oadev), color, 0.2);
     plot.points(noise.oadev.tau_s, noise.oadev.value, 2, color);
     const Stroke dashed{color, 1.2, {5, 3}};
     if (noise.fitted.size() == noise.oadev.tau_s.size()) {
@@ -73,7 +82,8 @@ std::string allan_svg(const std::vector<AllanSeries>& series, const std::string&
   SvgCanvas canvas(kWidth, kHeight);
   canvas.rectangle({0, 0}, kWidth, kHeight, "#ffffff");
   draw_allan(canvas, {0, 0}, kWidth, kHeight, series, unit);
-  return canvas.svg("allan", "Overlapping Allan deviation against averaging time");
+  return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n" +
+         canvas.svg("allan", "Overlapping Allan deviation against averaging time");
 }
 
 }  // namespace plumbline::app

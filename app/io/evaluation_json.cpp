@@ -25,8 +25,8 @@ std::optional<bool> within_limits(const Evaluation& evaluation,
   return max_abs_error(evaluation) <= limits->max_abs_error_mps2;
 }
 
-Json evaluation_json(const Evaluation& evaluation, const std::optional<Limits>& limits,
-                     const Provenance& provenance) {
+Json evaluation_json(const Evaluation& evaluation, std::size_t skipped_rows,
+                     const std::optional<Limits>& limits, const Provenance& provenance) {
   Json decision = {{"status", "none"}};
   if (const auto within = within_limits(evaluation, limits)) {
     decision = {{"status", *within ? "pass" : "fail"},
@@ -35,7 +35,10 @@ Json evaluation_json(const Evaluation& evaluation, const std::optional<Limits>& 
   }
   return {{"schema", "plumbline.evaluation/1"},
           {"provenance", json_provenance(provenance)},
-          {"data", {{"poses", evaluation.poses}, {"samples", evaluation.samples}}},
+          {"data",
+           {{"poses", evaluation.poses},
+            {"samples", evaluation.samples},
+            {"skipped_rows", skipped_rows}}},
           {"error", {{"before", to_json(evaluation.before)}, {"after", to_json(evaluation.after)}}},
           {"decision", decision}};
 }

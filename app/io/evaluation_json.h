@@ -14,7 +14,8 @@ namespace plumbline::app {
 std::optional<bool> within_limits(const Evaluation& evaluation,
                                   const std::optional<Limits>& limits);
 
-Json evaluation_json(const Evaluation& evaluation, const std::optional<Limits>& limits,
-                     const Provenance& provenance);
+/// `skipped_rows` of the set were refused and skipped on request.
+Json evaluation_json(const Evaluation& evaluation, std::size_t skipped_rows,
+                     const std::optional<Limits>& limits, const Provenance& provenance);
 
 }  // namespace plumbline::app

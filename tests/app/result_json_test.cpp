@@ -144,11 +144,12 @@ TEST(EvaluationJson, FollowsItsSchemaAndJudgesTheWorstAxis) {
   evaluation.poses = 24;
   evaluation.samples = 960;
   evaluation.after.pose_max_abs_mps2 = {0.1, 0.3, 0.2};
-  const Json none = evaluation_json(evaluation, std::nullopt, some_provenance());
+  const Json none = evaluation_json(evaluation, 0, std::nullopt, some_provenance());
   EXPECT_EQ(schema_violations("evaluation", file_text(none)), "");
   EXPECT_EQ(none["decision"]["status"], "none");
-  const Json fail = evaluation_json(evaluation, Limits{0.25}, some_provenance());
+  const Json fail = evaluation_json(evaluation, 3, Limits{0.25}, some_provenance());
   EXPECT_EQ(schema_violations("evaluation", file_text(fail)), "");
+  EXPECT_EQ(fail["data"]["skipped_rows"], 3);
   EXPECT_EQ(fail["decision"]["status"], "fail");
   EXPECT_EQ(fail["decision"]["max_abs_error_mps2"], 0.3);
   EXPECT_EQ(within_limits(evaluation, Limits{0.3}), std::optional(true));
