@@ -121,6 +121,10 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   for (const storage::EventRecord& event : stored->events) {
     job.events.push_back({.t_s = event.t_s, .kind = event.kind, .text = event.text});
   }
+  for (const std::string& column : stored->left_out) {
+    job.events.push_back(
+        {.t_s = 0, .kind = "left out", .text = column + ": not recorded throughout"});
+  }
   if (summary.state != storage::RunState::finished) {
     job.events.push_back({.t_s = 0,
                           .kind = "incomplete",

@@ -29,13 +29,18 @@ std::string example_run_toml() {
          "[angles]\nu_delta_arcsec = 1.0\nu_h_arcsec = 1.0\n";
 }
 
+Eigen::Vector3d ExampleSet::outputs_V(double delta_deg, double h_deg) const {
+  const Eigen::Vector4d a = specific_force(delta_deg, h_deg);
+  Eigen::Vector3d u = parameters * a;
+  u[0] += parameters(0, 0) * quadratic_g_per_g2 * a[0] * a[0];
+  return u;
+}
+
 void ExampleSet::write(const std::filesystem::path& folder) const {
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> noise(0.0, noise_V);
   const auto outputs = [&](double delta_deg, double h_deg) -> std::string {
-    const Eigen::Vector4d a = specific_force(delta_deg, h_deg);
-    Eigen::Vector3d u = parameters * a;
-    u[0] += parameters(0, 0) * quadratic_g_per_g2 * a[0] * a[0];
+    Eigen::Vector3d u = outputs_V(delta_deg, h_deg);
     for (double& value : u) value += noise(engine);
     return fmt::format("{:.8f},{:.8f},{:.8f}", u[0], u[1], u[2]);
   };

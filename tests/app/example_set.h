@@ -22,6 +22,8 @@ struct ExampleSet {
   int static_samples = 3000;
   std::uint64_t seed = 1;
 
+  /// Outputs without noise.
+  Eigen::Vector3d outputs_V(double delta_deg, double h_deg) const;
   /// Writes samples.csv, static.csv and run.toml.
   void write(const std::filesystem::path& folder) const;
 };

@@ -59,9 +59,10 @@ TEST(RigDescription, RefusesContradictions) {
             "rig.toml:12:1: adc: contradicts the converter of [sensor]; give it once");
   EXPECT_EQ(message_of(kRun + kRig + "[settling]\nhold_s = 3\ncap_s = 2\n"),
             "rig.toml:14:9: settling.cap_s: 2 is shorter than hold_s = 3");
-  EXPECT_EQ(message_of(kRun + kRig + "[plan]\norder = \"sneak\"\n"),
-            "rig.toml:13:9: plan.order = \"sneak\" is not one of raster, snake, spiral, random; did "
-            "you mean \"snake\"?");
+  EXPECT_EQ(
+      message_of(kRun + kRig + "[plan]\norder = \"sneak\"\n"),
+      "rig.toml:13:9: plan.order = \"sneak\" is not one of raster, snake, spiral, random; did "
+      "you mean \"snake\"?");
   EXPECT_EQ(message_of(kRun + kRig + "[plan]\nsample_per_pose = 3\n"),
             "rig.toml:13:1: unknown key plan.sample_per_pose; did you mean samples_per_pose?");
   EXPECT_EQ(message_of(kRun + kRig + "[plan]\nsamples_per_pose = 0\n"),
