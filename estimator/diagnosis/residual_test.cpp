@@ -1,26 +1,142 @@
-// Interim form: χ² of the whitened residual under the noise of the static record alone.
 #include "estimator/diagnosis/residual_test.h"
 
-#include "estimator/fit/least_squares.h"
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
 #include "estimator/noise/chi_squared.h"
 
 namespace plumbline {
 
+namespace {
+
+/// Monomials of degree 2 to 4 of the specific force.
+void append_position(const Eigen::MatrixXd& a, std::vector<Eigen::VectorXd>& columns) {
+  constexpr int kDegree = 4;
+  for (int i = 0; i <= kDegree; ++i)
+    for (int j = 0; i + j <= kDegree; ++j)
+      for (int k = 0; i + j + k <= kDegree; ++k)
+        if (i + j + k >= 2)
+          columns.emplace_back(
+              (a.col(0).array().pow(i) * a.col(1).array().pow(j) * a.col(2).array().pow(k))
+                  .matrix());
+}
+
+/// What may remain of the way to a pose: the change of the specific force, its sign (hysteresis),
+/// and the sense of turning about z times the cross axes (backlash). Zero at the first pose.
+void append_history(const Eigen::MatrixXd& a, std::vector<Eigen::VectorXd>& columns) {
+  const Eigen::Index n = a.rows();
+  Eigen::MatrixXd history = Eigen::MatrixXd::Zero(n, 8);
+  for (Eigen::Index i = 1; i < n; ++i) {
+    const Eigen::RowVector3d change = a.row(i) - a.row(i - 1);
+    const double turn = a(i - 1, 0) * a(i, 1) - a(i - 1, 1) * a(i, 0);
+    constexpr double kStill = 1e-9;
+    const auto sign = [](double v) { return v > kStill ? 1.0 : v < -kStill ? -1.0 : 0.0; };
+    history.row(i) << change, sign(change(0)), sign(change(1)), sign(change(2)),
+        sign(turn) * a(i, 0), sign(turn) * a(i, 1);
+  }
+  for (Eigen::Index c = 0; c < history.cols(); ++c) columns.emplace_back(history.col(c));
+}
+
+/// A scale that changes with time.
+void append_scale_drift(const Eigen::MatrixXd& a, std::vector<Eigen::VectorXd>& columns) {
+  const Eigen::ArrayXd order = Eigen::ArrayXd::LinSpaced(a.rows(), -1, 1);
+  for (Eigen::Index c = 0; c < 3; ++c) columns.emplace_back((order * a.col(c).array()).matrix());
+}
+
+/// Orthonormal basis of all these functions less what the design spans already.
+Eigen::MatrixXd structure_functions(const Eigen::MatrixXd& a, const Eigen::MatrixXd& drivers,
+                                    const Eigen::MatrixXd& design) {
+  std::vector<Eigen::VectorXd> columns;
+  append_position(a, columns);
+  append_history(a, columns);
+  append_scale_drift(a, columns);
+  for (Eigen::Index c = 0; c < drivers.cols(); ++c) {
+    const Eigen::VectorXd centred = drivers.col(c).array() - drivers.col(c).mean();
+    if (centred.norm() > 0) columns.emplace_back(centred / centred.norm());
+  }
+  const Eigen::Index n = a.rows();
+  Eigen::MatrixXd all(n, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    all.col(static_cast<Eigen::Index>(c)) = columns[c];
+  const Eigen::HouseholderQR<Eigen::MatrixXd> design_qr(design);
+  const Eigen::MatrixXd q = design_qr.householderQ() * Eigen::MatrixXd::Identity(n, design.cols());
+  all -= q * (q.transpose() * all);
+  // On the sphere the monomials are dependent.
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  qr.setThreshold(1e-6);
+  qr.compute(all);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(n, qr.rank());
+}
+
+}  // namespace
+
+Eigen::MatrixXd driver_means(const SampleTable& samples, const std::vector<Pose>& poses) {
+  std::vector<const std::vector<double>*> columns;
+  if (!samples.temp_C.empty()) columns.push_back(&samples.temp_C);
+  for (const Covariate& covariate : samples.covariates) columns.push_back(&covariate.value);
+  Eigen::MatrixXd means(static_cast<Eigen::Index>(poses.size()), 0);
+  for (const std::vector<double>* column : columns) {
+    Eigen::VectorXd mean(means.rows());
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      mean(static_cast<Eigen::Index>(i)) =
+          Eigen::Map<const Eigen::VectorXd>(column->data() + poses[i].first,
+                                            static_cast<Eigen::Index>(poses[i].count))
+              .mean();
+    if (!mean.allFinite()) continue;
+    means.conservativeResize(Eigen::NoChange, means.cols() + 1);
+    means.rightCols<1>() = mean;
+  }
+  return means;
+}
+
 ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInput& input) {
+  const Eigen::VectorXd& y = input.mean;
+  assert(input.specific_force.rows() == y.size() && input.specific_force.cols() == 3);
+  assert(input.drivers.size() == 0 || input.drivers.rows() == y.size());
+  const Eigen::Index n = y.size();
+  const Eigen::MatrixXd functions =
+      structure_functions(input.specific_force, input.drivers, input.design);
+  // Structure must not be taken for noise: the noise is estimated from what the functions leave.
+  // With too few poses for that they are not tested.
+  const bool enough = n >= input.design.cols() + 3 * functions.cols();
+  Eigen::MatrixXd full = input.design;
+  if (enough) {
+    full.resize(n, input.design.cols() + functions.cols());
+    full << input.design, functions;
+  }
+  const NoisePool pool(noise, input.windows, y, full, input.extra_variance);
   ResidualTestResult result;
-  NoiseModel proven = noise;
-  for (NoiseTerm* term : {&proven.Q, &proven.N, &proven.B, &proven.K, &proven.R})
-    if (!term->present) *term = {};
-  result.noise.power = noise_powers(proven);
-  result.noise.covariance = mean_covariance(proven, input.windows);
-  if (input.extra_variance.size() > 0) result.noise.covariance.diagonal() += input.extra_variance;
-  const std::optional<Whitening> whitening = Whitening::of(result.noise.covariance);
-  if (!whitening) return result;
-  const LeastSquaresResult fit =
-      solve_least_squares(whitening->apply(input.design), whitening->apply(input.mean));
-  result.chi2 = fit.residual_sum_of_squares;
-  result.dof = static_cast<double>(fit.degrees_of_freedom);
-  result.p_value = chi_squared_tail(result.chi2, result.dof);
+  result.noise = pool.pooled();
+  const Projector before = make_projector(result.noise.covariance, input.design);
+  result.chi2 = y.dot(before.P * y);
+  result.dof = static_cast<double>(n - input.design.cols());
+  const Projector after = make_projector(result.noise.covariance, full);
+  const Eigen::MatrixXd& P = after.P;
+  const Eigen::VectorXd py = P * y;
+  const double left = y.dot(py);
+  if (enough)
+    result.p_structure =
+        chi_squared_tail(result.chi2 - left, static_cast<double>(functions.cols()));
+
+  // Scatter from pose to pose: the score of an independent variance beside the noise, against its
+  // expectation; a scaled χ² with the same two moments (Satterthwaite).
+  const double scatter = py.squaredNorm();
+  const double expected = P.trace();
+  const double variance = 2 * P.squaredNorm();
+  result.p_excess =
+      chi_squared_tail(2 * expected * scatter / variance, 2 * expected * expected / variance);
+
+  // The pose that fits worst, judged by the others.
+  double worst = 0;
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (P(i, i) > 0) worst = std::max(worst, std::abs(py(i)) / std::sqrt(P(i, i)));
+  result.p_outlier = std::min(1.0, static_cast<double>(n) * normal_two_sided_tail(worst));
+
+  result.p_value =
+      std::min(1.0, 3 * std::min({result.p_structure, result.p_excess, result.p_outlier}));
   return result;
 }
 

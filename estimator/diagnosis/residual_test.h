@@ -17,21 +17,32 @@ struct ResidualTestInput {
   const Eigen::MatrixXd& specific_force;     ///< n×3, g: what the position-dependent tests use
   const std::vector<SampleWindow>& windows;  ///< n
   const Eigen::VectorXd& extra_variance;     ///< n known variances (positioning), V², or empty
+  /// n×k means of further recorded quantities (temperature, humidity …), any unit; may be empty.
+  Eigen::MatrixXd drivers = {};
 };
 
 struct ResidualTestResult {
   double chi2 = 0;         ///< whitened sum of squares r'Σ⁻¹r
   double dof = 0;          ///< n − p
   double p_value = 1;      ///< of the combined test
-  double p_structure = 1;  ///< smooth functions of the position
+  double p_structure = 1;  ///< functions of position, way to the pose and drivers
   double p_excess = 1;     ///< more scatter from pose to pose than the noise allows
   double p_outlier = 1;    ///< the most deviating single pose
   PooledNoise noise;       ///< noise powers under "no effect", and the Σ that was used
 };
 
-/// Tests "the model plus the identified noise is all there is". The slow noise terms, uncertain in
-/// a short static record, are re-estimated together with the run under that hypothesis first.
-/// The partial tests are combined by Bonferroni, so p_value is conservative.
+/// Pose means of temperature and covariates, n×k, for ResidualTestInput::drivers; a quantity that
+/// is not recorded throughout is left out.
+Eigen::MatrixXd driver_means(const SampleTable& samples, const std::vector<Pose>& poses);
+
+/// Tests "the model plus the identified noise is all there is".
+///
+/// The slow noise terms, uncertain in a static record shorter than the run, are re-estimated from
+/// record and run together (reml.h), beside broad structure functions: monomials of the specific
+/// force up to degree 4, the way from the previous pose, scale drift, the drivers. p_structure is
+/// their joint χ²; p_excess and p_outlier judge what they leave. Fewer than p + 3 × functions poses
+/// leave p_structure at 1. Slow drift that none of them describes is taken for noise: it cannot be
+/// told from flicker and random walk. The three are combined by Bonferroni.
 ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInput& input);
 
 }  // namespace plumbline

@@ -109,14 +109,15 @@ Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<Sampl
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t term = 0; term < kTermCount; ++term)
     covariance += power(static_cast<Eigen::Index>(term)) * unit[term];
-  if (model.rounding_step > 0) {
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double step_s = windows[static_cast<std::size_t>(i)].step_s;
-      const double sigma = std::sqrt(power(kTermN) / step_s);
-      covariance(i, i) += rounding_variance(model.rounding_step, sigma);
-    }
-  }
+  covariance.diagonal().array() += shared_rounding_variance(model);
   return covariance;
+}
+
+double shared_rounding_variance(const NoiseModel& model) {
+  if (!(model.rounding_step > 0)) return 0;
+  const double white = model.N.value * model.N.value * model.rate_hz;
+  const double before = white - model.rounding_step * model.rounding_step / 12;
+  return rounding_variance(model.rounding_step, std::sqrt(std::max(before, 0.0)));
 }
 
 double rounding_variance(double step, double sigma) {

@@ -33,9 +33,14 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
 std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows);
 
 /// Covariance of the window means under all identified terms, U², positive definite when white
-/// noise or rounding is present. Rounding coarser than the noise adds rounding_variance() to the
-/// diagonal.
+/// noise or rounding is present. Rounding coarser than the noise adds shared_rounding_variance() to
+/// the diagonal.
 Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<SampleWindow>& windows);
+
+/// Rounding offset that all readings of a window share under `model`, U²: rounding_variance() with
+/// the noise before rounding, since the white noise of a record holds step²/12 of it. 0 without
+/// `rounding_step`.
+double shared_rounding_variance(const NoiseModel& model);
 
 /// Variance, over a uniformly distributed true value, of the offset that rounding to `step` leaves
 /// in the mean of many readings with Gaussian noise `sigma`:

@@ -71,7 +71,7 @@ void fill_terms(const TermFit& fit, NoiseModel& model) {
       if (covariance(i, i) > 0 && covariance(j, j) > 0)
         model.correlation(i, j) = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
   if (model.R.u > 0) model.correlation(kTermR, kTermR) = 1;
-  model.power_information = fit.information;
+  model.spectrum = fit.spectrum;
 }
 
 double fitted_deviation(const NoiseModel& model, double tau) {
@@ -158,8 +158,8 @@ NoiseModel identify_noise_from_bursts(const SampleTable& samples, const std::vec
   model.N.u = model.N.value / std::sqrt(2 * dof);
   model.N.present = true;
   model.N.upper_limit = model.N.value + 1.645 * model.N.u;
-  const double power = model.N.value * model.N.value;
-  model.power_information(kTermN, kTermN) = 0.5 * dof / (power * power);
+  model.spectrum.push_back(
+      {.count = dof, .square = square, .density = Eigen::Vector4d(0, rate_hz, 0, 0)});
   model.correlation(kTermN, kTermN) = 1;
   model.adequate = true;
   return model;

@@ -36,6 +36,18 @@ struct DeviationCurve {
   std::vector<double> upper;
 };
 
+/// Neighbouring coefficients of a record's cosine spectrum taken together (term_fit.h). A list of
+/// them is all that a record says about the noise powers: its likelihood can be pooled with other
+/// data.
+struct SpectrumBin {
+  double count = 0;   ///< coefficients c in the bin
+  double square = 0;  ///< Σc², U²
+  double cross = 0;   ///< Σc·m, m the coefficient of a ramp of 1 U/s
+  double ramp = 0;    ///< Σm²
+  /// Mean variance of a coefficient for Q², N², B², K² = 1.
+  Eigen::Vector4d density = Eigen::Vector4d::Zero();
+};
+
 /// Noise of one channel in units of the record ("U"; V for the outputs of a triad).
 struct NoiseModel {
   NoiseTerm Q;  ///< quantization, U·s:             σ² = 3Q²/τ²
@@ -58,9 +70,7 @@ struct NoiseModel {
 
   /// Correlation of the five coefficients, order Q N B K R; zero rows for terms at zero.
   NoisePowerMatrix correlation = NoisePowerMatrix::Zero();
-  /// Fisher information of the record about [Q² N² B² K² ·]; what later estimates from other data
-  /// are pooled with. Row and column R are zero: the ramp is a trend, not a variance.
-  NoisePowerMatrix power_information = NoisePowerMatrix::Zero();
+  std::vector<SpectrumBin> spectrum;  ///< what the record says about the powers
 };
 
 /// [Q² N² B² K² R²] as identified. The ramp counts only when it is present: an unproven trend

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "estimator/noise/covariance.h"
@@ -9,7 +10,7 @@
 
 namespace plumbline {
 
-/// Result of pooling.
+/// What is known of the noise of the run's window means.
 struct PooledNoise {
   NoisePowers power = NoisePowers::Zero();                  ///< [Q² N² B² K² R²]
   NoisePowerMatrix information = NoisePowerMatrix::Zero();  ///< of both sources about them
@@ -18,13 +19,42 @@ struct PooledNoise {
 };
 
 /// Restricted maximum likelihood (Patterson & Thompson, 1971) of the noise powers given window
-/// means y = design·β + noise, β free, with the information of the static record as a Gaussian
-/// prior. mean: n; design: n×p of full rank, n > p; extra_variance: n further known variances
-/// (positioning, say), or empty.
-/// White noise and quantization stay as the record says; the slow terms, which a record shorter
-/// than the run barely determines, move.
-PooledNoise pool_noise(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                       const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                       const Eigen::VectorXd& extra_variance);
+/// means y = design·β + noise, β free, times the likelihood of the record that `model` came from.
+/// The ramp and rounding stay as the model says. A record that determines white noise well pins it;
+/// the slow terms, which a record shorter than the run barely determines, move.
+class NoisePool {
+ public:
+  /// mean: n; design: n×p of full rank, n > p; extra_variance: n further known variances
+  /// (positioning, say), or empty. The arguments are copied but for `windows`.
+  NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+            const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+            const Eigen::VectorXd& extra_variance);
+
+  /// Maximum over both sources.
+  PooledNoise pooled() const;
+
+  /// Σ of the window means at given powers.
+  Eigen::MatrixXd covariance(const NoisePowers& power) const;
+
+ private:
+  struct Point;
+  Point evaluate(const Eigen::Vector4d& power) const;
+  Point maximise(const Eigen::Vector4d& start, unsigned free) const;
+
+  std::vector<SpectrumBin> spectrum_;
+  std::array<Eigen::MatrixXd, kTermCount> unit_;
+  Eigen::MatrixXd known_;  // ramp, rounding and extra variance
+  Eigen::VectorXd mean_;
+  Eigen::MatrixXd design_;
+  NoisePowers start_;
+};
+
+/// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
+/// the generalised least-squares residual r.
+struct Projector {
+  Eigen::MatrixXd P;
+  double log_determinant = 0;  ///< ln|Σ| + ln|X'Σ⁻¹X|
+};
+Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design);
 
 }  // namespace plumbline

@@ -1,6 +1,5 @@
 #include "estimator/noise/term_fit.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -9,6 +8,7 @@
 #include <numbers>
 
 #include "estimator/noise/chi_squared.h"
+#include "estimator/noise/nonnegative.h"
 #include "estimator/noise/spectrum.h"
 
 namespace plumbline {
@@ -16,17 +16,9 @@ namespace plumbline {
 namespace {
 
 constexpr int kStochastic = 4;  // Q, N, B, K; the ramp is a mean
-using Vector4 = Eigen::Matrix<double, kStochastic, 1>;
-using Matrix4 = Eigen::Matrix<double, kStochastic, kStochastic>;
-
-/// Neighbouring coefficients taken together; within a bin the density hardly changes.
-struct Bin {
-  double count = 0;
-  double square = 0;                  ///< Σc²
-  double cross = 0;                   ///< Σc·m, m the cosine coefficient of the unit ramp
-  double ramp = 0;                    ///< Σm²
-  Vector4 density = Vector4::Zero();  ///< mean variance of a coefficient per unit of power
-};
+using Vector4 = Eigen::Vector4d;
+using Matrix4 = Eigen::Matrix4d;
+using Bin = SpectrumBin;
 
 /// Variance of flicker coefficient k relative to its density at that frequency: the ends of the
 /// record take a little away. Closed form with the sine integral, (2/π)(Si(πk) − (1−(−1)^k)/(πk)).
@@ -91,6 +83,7 @@ Slope fit_slope(const std::vector<Bin>& bins, const Vector4& power) {
     cross += bin.cross / variance;
     ramp += bin.ramp / variance;
   }
+  if (!(ramp > 0)) return {};  // a spectrum without low frequencies knows no ramp
   return {cross / ramp, 1 / ramp};
 }
 
@@ -101,45 +94,12 @@ double bin_square(const Bin& bin, const Slope& slope) {
 /// −2 ln of the restricted likelihood.
 double deviance(const std::vector<Bin>& bins, const Vector4& power) {
   const Slope slope = fit_slope(bins, power);
-  double sum = -std::log(slope.variance);
+  double sum = slope.variance > 0 ? -std::log(slope.variance) : 0;
   for (const Bin& bin : bins) {
     const double variance = bin.density.dot(power);
     sum += bin.count * std::log(variance) + bin_square(bin, slope) / variance;
   }
   return sum;
-}
-
-/// min θ'Aθ/2 − b'θ over θ ≥ 0: the best of all choices of terms at zero.
-Vector4 nonnegative_solution(const Matrix4& a, const Vector4& b, unsigned allowed) {
-  Vector4 best = Vector4::Zero();
-  double best_value = std::numeric_limits<double>::infinity();
-  for (unsigned subset = 1; subset < (1U << kStochastic); ++subset) {
-    if ((subset & ~allowed) != 0) continue;
-    std::array<int, kStochastic> index{};
-    int size = 0;
-    for (int i = 0; i < kStochastic; ++i)
-      if ((subset >> i & 1U) != 0) index[static_cast<std::size_t>(size++)] = i;
-    Eigen::MatrixXd reduced(size, size);
-    Eigen::VectorXd right(size);
-    for (int i = 0; i < size; ++i) {
-      right(i) = b(index[static_cast<std::size_t>(i)]);
-      for (int j = 0; j < size; ++j)
-        reduced(i, j) = a(index[static_cast<std::size_t>(i)], index[static_cast<std::size_t>(j)]);
-    }
-    // Powers differ by many decades: scale to a unit diagonal.
-    const Eigen::VectorXd scale = reduced.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced * scale.asDiagonal();
-    const Eigen::VectorXd solution =
-        scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right)));
-    if (!solution.allFinite() || solution.minCoeff() < 0) continue;
-    const double value = 0.5 * solution.dot(reduced * solution) - right.dot(solution);
-    if (value < best_value) {
-      best_value = value;
-      best.setZero();
-      for (int i = 0; i < size; ++i) best(index[static_cast<std::size_t>(i)]) = solution(i);
-    }
-  }
-  return best;
 }
 
 struct Maximum {
@@ -158,18 +118,9 @@ Maximum maximise(const std::vector<Bin>& bins, unsigned allowed, const Vector4& 
   now.deviance = deviance(bins, start + fixed);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     const Vector4 total = now.power + fixed;
-    const Slope slope = fit_slope(bins, total);
-    Matrix4 a = Matrix4::Zero();
-    Vector4 b = Vector4::Zero();
-    for (const Bin& bin : bins) {
-      const double variance = bin.density.dot(total);
-      const double weight = 1 / (variance * variance);
-      // The slope's own variance gives back the degree of freedom it took.
-      const double square = bin_square(bin, slope) + slope.variance * bin.ramp;
-      a.noalias() += bin.count * weight * bin.density * bin.density.transpose();
-      b.noalias() += weight * (square - bin.count * bin.density.dot(fixed)) * bin.density;
-    }
-    const Vector4 target = nonnegative_solution(a, b, allowed);
+    const Likelihood here = spectrum_likelihood(bins, total);
+    const Vector4 target =
+        nonnegative_solution(here.normal, here.right - here.normal * fixed, allowed);
     double step = 1;
     Maximum next;
     for (; step > 1e-4; step *= 0.5) {
@@ -212,23 +163,6 @@ Vector4 starting_powers(const std::vector<Bin>& bins, unsigned allowed) {
     power(i) = 0.5 * smallest;
   }
   return power;
-}
-
-/// Expected information about the powers, less what the slope takes.
-Matrix4 fisher_information(const std::vector<Bin>& bins, const Vector4& power) {
-  Matrix4 plain = Matrix4::Zero();
-  Matrix4 mixed = Matrix4::Zero();
-  Vector4 single = Vector4::Zero();
-  const Slope slope = fit_slope(bins, power);
-  for (const Bin& bin : bins) {
-    const double variance = bin.density.dot(power);
-    const Matrix4 outer = bin.density * bin.density.transpose();
-    plain += bin.count / (variance * variance) * outer;
-    mixed += bin.ramp / (variance * variance * variance) * outer;
-    single += bin.ramp / (variance * variance) * bin.density;
-  }
-  return 0.5 * (plain - 2 * slope.variance * mixed +
-                slope.variance * slope.variance * single * single.transpose());
 }
 
 /// Power of term i at which the profile deviance has risen by 2.71 (one-sided 95 %).
@@ -306,6 +240,31 @@ void judge_fit(const std::vector<double>& c, const std::vector<Bin>& bins, const
 
 }  // namespace
 
+Likelihood spectrum_likelihood(const std::vector<SpectrumBin>& spectrum,
+                               const Eigen::Vector4d& power) {
+  Likelihood result;
+  result.deviance = deviance(spectrum, power);
+  Matrix4 plain = Matrix4::Zero();
+  Matrix4 mixed = Matrix4::Zero();
+  Vector4 single = Vector4::Zero();
+  const Slope slope = fit_slope(spectrum, power);
+  for (const SpectrumBin& bin : spectrum) {
+    const double variance = bin.density.dot(power);
+    const double weight = 1 / (variance * variance);
+    const Matrix4 outer = bin.density * bin.density.transpose();
+    plain += bin.count * weight * outer;
+    mixed += bin.ramp * weight / variance * outer;
+    single += bin.ramp * weight * bin.density;
+    // The slope's own variance gives back the degree of freedom it took.
+    const double square = bin_square(bin, slope) + slope.variance * bin.ramp;
+    result.right += weight * (square - bin.count * variance) * bin.density;
+  }
+  result.normal = plain - 2 * slope.variance * mixed +
+                  slope.variance * slope.variance * single * single.transpose();
+  result.right += result.normal * power;
+  return result;
+}
+
 TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
   assert(record.size() >= 32 && rate_hz > 0);
   const std::vector<double> c = cosine_transform(record);
@@ -315,6 +274,7 @@ TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
 
   TermFit fit;
   fit.converged = best.converged;
+  fit.spectrum = bins;
   fit.power.head<kStochastic>() = best.power;
   const Slope slope = fit_slope(bins, best.power);
   fit.power(kTermR) = slope.value * slope.value;
@@ -322,7 +282,7 @@ TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
   fit.gain(kTermR) = slope.value * slope.value / slope.variance;
   const double ramp_limit = std::abs(slope.value) + 1.645 * fit.ramp_u;
   fit.upper_power(kTermR) = ramp_limit * ramp_limit;
-  const Matrix4 information = fisher_information(bins, best.power);
+  const Matrix4 information = 0.5 * spectrum_likelihood(bins, best.power).normal;
   fit.information.topLeftCorner<kStochastic, kStochastic>() = information;
   for (int i = 0; i < kStochastic; ++i) {
     Vector4 start = best.power;

@@ -7,6 +7,17 @@
 
 namespace plumbline {
 
+/// Restricted Gaussian likelihood of a spectrum at the powers [Q² N² B² K²], the ramp profiled out.
+struct Likelihood {
+  double deviance = 0;  ///< −2 ln L but for a constant
+  /// Scoring step: the powers that solve normal·power = right are the next estimate, and normal/2
+  /// is the Fisher information.
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+};
+Likelihood spectrum_likelihood(const std::vector<SpectrumBin>& spectrum,
+                               const Eigen::Vector4d& power);
+
 /// Maximum (restricted) Whittle likelihood of Q, N, B, K ≥ 0 and the ramp.
 struct TermFit {
   NoisePowers power = NoisePowers::Zero();                  ///< [Q² N² B² K² R²]
@@ -21,6 +32,7 @@ struct TermFit {
   double line_hz = 0;         ///< the strongest one
   double line_amplitude = 0;  ///< of the sine, U
   bool converged = false;
+  std::vector<SpectrumBin> spectrum;
 };
 
 /// Fits a record of at least 32 samples (precondition). Spectral densities of the sampled terms,

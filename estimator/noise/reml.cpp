@@ -1,0 +1,155 @@
+#include "estimator/noise/reml.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "estimator/noise/nonnegative.h"
+#include "estimator/noise/term_fit.h"
+
+namespace plumbline {
+
+namespace {
+
+constexpr unsigned kAllTerms = 0b1111;  // Q, N, B, K
+constexpr Eigen::Index kVarianceTerms = kTermR;
+
+}  // namespace
+
+Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design) {
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
+  assert(cholesky.info() == Eigen::Success);
+  const Eigen::Index n = covariance.rows();
+  const Eigen::MatrixXd white_design = cholesky.matrixL().solve(design);
+  const Eigen::LLT<Eigen::MatrixXd> normal(white_design.transpose() * white_design);
+  Projector result;
+  const Eigen::MatrixXd inverse = cholesky.solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd weighted = inverse * design;
+  result.P = inverse - weighted * normal.solve(weighted.transpose());
+  result.log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum() +
+                           2 * normal.matrixLLT().diagonal().array().log().sum();
+  return result;
+}
+
+struct NoisePool::Point {
+  Eigen::Vector4d power = Eigen::Vector4d::Zero();
+  double deviance = 0;
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  bool converged = false;
+};
+
+NoisePool::NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                     const Eigen::VectorXd& extra_variance)
+    : spectrum_(model.spectrum),
+      unit_(unit_covariances(windows)),
+      mean_(mean),
+      design_(design),
+      start_(noise_powers(model)) {
+  assert(mean.size() == design.rows() && mean.size() > design.cols());
+  assert(extra_variance.size() == 0 || extra_variance.size() == mean.size());
+  known_ = start_(kTermR) * unit_[kTermR];
+  if (extra_variance.size() > 0) known_.diagonal() += extra_variance;
+  known_.diagonal().array() += shared_rounding_variance(model);
+}
+
+Eigen::MatrixXd NoisePool::covariance(const NoisePowers& power) const {
+  Eigen::MatrixXd sum = known_;
+  for (Eigen::Index i = 0; i < kVarianceTerms; ++i)
+    if (power(i) > 0) sum += power(i) * unit_[static_cast<std::size_t>(i)];
+  return sum;
+}
+
+NoisePool::Point NoisePool::evaluate(const Eigen::Vector4d& power) const {
+  Point point;
+  point.power = power;
+  if (!spectrum_.empty()) {
+    const Likelihood record = spectrum_likelihood(spectrum_, power);
+    point.deviance += record.deviance;
+    point.normal += record.normal;
+    point.right += record.right;
+  }
+  NoisePowers powers = start_;
+  powers.head<kVarianceTerms>() = power;
+  const Projector projector = make_projector(covariance(powers), design_);
+  const Eigen::VectorXd py = projector.P * mean_;
+  point.deviance += projector.log_determinant + mean_.dot(py);
+  std::array<Eigen::MatrixXd, kVarianceTerms> pc;
+  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
+    if (i == kTermN)  // diagonal
+      pc[i] = projector.P * unit_[i].diagonal().asDiagonal();
+    else if (i != kTermQ || power(kTermQ) > 0)
+      pc[i].noalias() = projector.P * unit_[i];
+    else
+      pc[i] = projector.P * unit_[i].diagonal().asDiagonal();
+  }
+  Eigen::Matrix4d normal;
+  Eigen::Vector4d score;
+  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
+    const auto a = static_cast<Eigen::Index>(i);
+    score(a) = py.dot(unit_[i] * py) - pc[i].trace();
+    for (std::size_t j = 0; j <= i; ++j) {
+      const auto b = static_cast<Eigen::Index>(j);
+      normal(a, b) = pc[i].cwiseProduct(pc[j].transpose()).sum();
+      normal(b, a) = normal(a, b);
+    }
+  }
+  point.normal += normal;
+  point.right += normal * power + score;
+  return point;
+}
+
+NoisePool::Point NoisePool::maximise(const Eigen::Vector4d& start, unsigned free) const {
+  constexpr int kIterations = 40;
+  constexpr double kEnough = 1e-2;  // of −2 ln L: far below anything a test can feel
+  Eigen::Vector4d fixed = start;
+  for (int i = 0; i < 4; ++i)
+    if ((free >> i & 1U) != 0) fixed(i) = 0;
+  Point now = evaluate(start);
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const Eigen::Vector4d target =
+        fixed + nonnegative_solution(now.normal, now.right - now.normal * fixed, free);
+    Point next;
+    bool better = false;
+    for (double step = 1; step > 1e-3 && !better; step *= 0.25) {
+      const Eigen::Vector4d candidate = now.power + step * (target - now.power);
+      if (!(candidate(kTermQ) + candidate(kTermN) > 0)) continue;  // Σ would be singular
+      next = evaluate(candidate);
+      better = next.deviance <= now.deviance;
+    }
+    if (!better) {
+      now.converged = true;  // no descent left but rounding
+      return now;
+    }
+    const double gained = now.deviance - next.deviance;
+    now = next;
+    if (gained < kEnough) {
+      now.converged = true;
+      return now;
+    }
+  }
+  return now;
+}
+
+PooledNoise NoisePool::pooled() const {
+  Eigen::Vector4d start = start_.head<kVarianceTerms>();
+  // A term that the record puts at zero starts at one per cent of the white variance of the means.
+  const Eigen::Index middle = mean_.size() / 2;
+  const double white = start(kTermN) * unit_[kTermN](middle, middle);
+  if (!(start(kTermB) > 0)) start(kTermB) = 0.01 * white;
+  if (!(start(kTermK) > 0)) start(kTermK) = 0.01 * white / unit_[kTermK](middle, middle);
+  // The means cannot tell quantization from white noise: without a record it stays at zero.
+  const unsigned free = spectrum_.size() > 4 ? kAllTerms : kAllTerms & ~1U;
+  const Point best = maximise(start, free);
+  PooledNoise result;
+  result.power = start_;
+  result.power.head<kVarianceTerms>() = best.power;
+  result.information.topLeftCorner<4, 4>() = 0.5 * best.normal;
+  result.covariance = covariance(result.power);
+  result.converged = best.converged;
+  return result;
+}
+
+}  // namespace plumbline
