@@ -31,6 +31,7 @@ struct Experiment {
   std::vector<SampleWindow> windows;
   std::array<Eigen::MatrixXd, kTermCount> unit_covariance;  ///< of the pose means, per noise term
   Eigen::MatrixXd A;                                        ///< n × 4
+  Eigen::MatrixXd drivers;                                  ///< n × k, temperature and covariates
 };
 
 /// One axis on its way through the engine.
@@ -77,14 +78,6 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
   return variance;
 }
 
-/// Rounding that all samples of a dwell share. White noise of the record holds the rest of lsb²/12.
-double shared_rounding_V2(const NoiseModel& noise) {
-  if (noise.rounding_step <= 0) return 0;
-  const double white_V2 = squared(noise.N.value) * noise.rate_hz;
-  const double before_rounding_V2 = white_V2 - squared(noise.rounding_step) / 12.0;
-  return rounding_variance(noise.rounding_step, std::sqrt(std::max(before_rounding_V2, 0.0)));
-}
-
 /// Covariance of the pose means, n × n.
 Eigen::MatrixXd pose_covariance_V2(const Experiment& experiment, const NoisePowers& powers,
                                    const Eigen::VectorXd& own_V2) {
@@ -119,13 +112,13 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   const Eigen::Index n = work.y.size();
   const LeastSquaresResult ordinary = solve_least_squares(experiment.A, work.y);
   const Eigen::VectorXd positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
-  work.own_V2 = positioning_V2.array() + shared_rounding_V2(identified);
+  work.own_V2 = positioning_V2.array() + shared_rounding_variance(identified);
 
   NoisePowers powers = noise_powers(identified);
   if (n > 4 && powers.sum() > 0) {
     const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
-    work.test =
-        test_residual(identified, {work.y, experiment.A, a_g, experiment.windows, positioning_V2});
+    work.test = test_residual(identified, {work.y, experiment.A, a_g, experiment.windows,
+                                           positioning_V2, experiment.drivers});
     powers = work.test.noise.power;
   }
   work.noise = with_powers(identified, powers);
@@ -248,7 +241,7 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
 
 Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /*options*/) {
   assert(input.run.has_angles && !input.run.poses.empty());
-  Experiment experiment{input, pose_means(input.run), {}, {}, {}};
+  Experiment experiment{input, pose_means(input.run), {}, {}, {}, {}};
   experiment.A = design_matrix(experiment.poses, input.description.gravity);
 
   Calibration result;
@@ -259,6 +252,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /
   if (result.observability.rank < 4) return result;
 
   experiment.windows = pose_windows(input.run.samples, input.run.poses);
+  experiment.drivers = driver_means(input.run.samples, input.run.poses);
   experiment.unit_covariance = unit_covariances(experiment.windows);
   const std::size_t n = experiment.poses.size();
   result.convergence.rls.resize(n);
