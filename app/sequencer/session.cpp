@@ -1,0 +1,163 @@
+#include "app/sequencer/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <utility>
+
+#include "app/provenance.h"
+#include "app/sequencer/plan.h"
+
+namespace plumbline::app {
+
+namespace {
+
+struct Started {
+  storage::RunId run = 0;
+  StartPoint start;
+};
+
+storage::RunHeader header_of(const RigDescription& rig, const Plan& plan) {
+  return {.serial = rig.run.dut.serial,
+          .program_version = program_version(),
+          .config_toml = rig.source,
+          .plan_csv = to_csv(plan),
+          .started_utc = utc_now(),
+          .rate_hz = rig.sensor.rate_hz,
+          .adc = rig.sensor.adc};
+}
+
+double seconds_since(const std::string& utc) {
+  std::tm parts{};
+  if (strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts) == nullptr) return 0;
+  return std::difftime(std::time(nullptr), timegm(&parts));
+}
+
+/// After everything that is stored, by the wall clock where it can be believed.
+double clock_of_resumption(const storage::StoredRun& stored, double rate_hz) {
+  double last_s = 0;
+  for (const SampleTable* table :
+       {&stored.soak, &stored.grid.samples, &stored.verification.samples}) {
+    if (table->size() > 0) last_s = std::max(last_s, table->t_s.back());
+  }
+  double start_s = last_s + 1 / rate_hz;
+  if (!stored.events.empty()) {
+    const storage::EventRecord& event = stored.events.back();
+    start_s = std::max(start_s, event.t_s + seconds_since(event.utc));
+  }
+  return start_s;
+}
+
+/// The soak as it arrived, for learning the noise floor again.
+std::vector<RawSample> soak_codes(const SampleTable& soak, const Adc& adc, double rate_hz) {
+  std::vector<RawSample> samples(soak.size());
+  const double mid_V = adc.volts(0);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].counter = std::llround(soak.t_s[i] * rate_hz);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      samples[i].code[axis] =
+          static_cast<std::int32_t>(std::lround((soak.u_V[axis][i] - mid_V) / adc.lsb_V()));
+    }
+  }
+  return samples;
+}
+
+Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& request,
+                                const Plan& plan) {
+  const RigDescription& rig = request.rig;
+  const auto refuse = [&](const std::string& why) {
+    return fail(ErrorCode::input, fmt::format("{}: {}", request.database.string(), why));
+  };
+  const auto runs = store.runs();
+  if (!runs) return fail(runs.error());
+  const storage::RunSummary* last = nullptr;
+  for (const storage::RunSummary& run : *runs) {
+    if (run.header.serial != rig.run.dut.serial) continue;
+    if (last == nullptr || run.id > last->id) last = &run;
+  }
+  if (last == nullptr) {
+    return refuse(fmt::format("holds no run of {} to resume", rig.run.dut.serial));
+  }
+  if (last->state == storage::RunState::finished) {
+    return refuse(
+        fmt::format("run {}, the last one of {}, is finished; start a new one without "
+                    "--resume",
+                    last->id, rig.run.dut.serial));
+  }
+  if (last->header.plan_csv != to_csv(plan)) {
+    return refuse(
+        fmt::format("run {} was started with another plan; resume it with the "
+                    "configuration of then, or start a new run without --resume",
+                    last->id));
+  }
+  if (last->header.config_toml != rig.source) {
+    return refuse(
+        fmt::format("run {} was started with another configuration; resume it with that "
+                    "one, or start a new run without --resume",
+                    last->id));
+  }
+  Started found{last->id, {}};
+  auto committed = store.committed_poses(last->id);
+  if (!committed) return fail(committed.error());
+  found.start.committed = *std::move(committed);
+  const auto stored = store.load(last->id);
+  if (!stored) return fail(stored.error());
+  found.start.t_s = clock_of_resumption(*stored, rig.sensor.rate_hz);
+  if (rig.settling.noise_V <= 0) {
+    found.start.floor = learn_noise_floor(
+        soak_codes(stored->soak, rig.sensor.adc, rig.sensor.rate_hz), rig.sensor.adc,
+        static_cast<std::size_t>(rig.settling.window), rig.sensor.rate_hz);
+  }
+  if (auto reopened = store.finish_run(last->id, storage::RunState::running, ""); !reopened) {
+    return fail(reopened.error());
+  }
+  const auto noted = store.add_event(
+      last->id,
+      {found.start.t_s, utc_now(), "resume",
+       fmt::format("{} of {} steps are stored", found.start.committed.size(), plan.steps.size())});
+  if (!noted) return fail(noted.error());
+  return found;
+}
+
+Result<Started> begin(storage::RunStore& store, const SessionRequest& request, const Plan& plan) {
+  if (request.resume) return find_unfinished(store, request, plan);
+  auto run = store.create_run(header_of(request.rig, plan));
+  if (!run) return fail(run.error());
+  return Started{*run, {}};
+}
+
+}  // namespace
+
+Result<Session> run_session(const SessionRequest& request, const EngineControl& control,
+                            const ProgressObserver& observer) {
+  const RigDescription& rig = request.rig;
+  const Plan plan = make_plan(rig.run.grid, rig.plan, rig.sensor.rate_hz);
+  if (rig.soft_limits) {
+    if (auto allowed = check_plan(plan, *rig.soft_limits); !allowed) return fail(allowed.error());
+  }
+  auto head = rig::make_dividing_head(rig.head);
+  if (!head) return fail(head.error());
+  auto source = rig::make_sample_source(rig.sensor);
+  if (!source) return fail(source.error());
+  auto store = storage::RunStore::open(request.database);
+  if (!store) return fail(store.error());
+  rig::Acquisition acquisition(*std::move(source));
+  if (auto started = acquisition.start(); !started) return fail(started.error());
+  auto begun = begin(*store, request, plan);
+  if (!begun) return fail(begun.error());
+
+  EngineOptions options;
+  options.rate_hz = rig.sensor.rate_hz;
+  options.adc = rig.sensor.adc;
+  options.motion = {rig.head.speed_deg_s, rig.head.acceleration_deg_s2};
+  options.settling = rig.settling;
+  options.poll_interval = rig.head.poll_interval;
+  options.watchdog = rig.head.watchdog;
+  Engine engine(**head, acquisition, *store, control, options, observer);
+  return Session{begun->run, engine.run(plan, begun->run, begun->start)};
+}
+
+}  // namespace plumbline::app

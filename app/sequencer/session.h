@@ -1,0 +1,31 @@
+// One run from a description of the rig to committed poses: opens everything that an engine needs.
+#pragma once
+
+#include <filesystem>
+
+#include "app/config/rig_description.h"
+#include "app/sequencer/engine.h"
+#include "estimator/measurement.h"
+#include "storage/run_store.h"
+
+namespace plumbline::app {
+
+struct SessionRequest {
+  const RigDescription& rig;
+  std::filesystem::path database;
+  bool resume = false;  ///< go on with the last unfinished run of rig.run.dut.serial
+};
+
+/// A run that has been started: how it ended, and which one it is.
+struct Session {
+  storage::RunId run = 0;
+  Result<void> outcome;  ///< as of Engine::run()
+};
+
+/// Fails before anything moves when the plan, the database, the run to be resumed or the sensor bus
+/// refuses; a failure is then the whole result. A resumed run must have the same configuration and
+/// plan, word for word; its clock goes on by the time that has passed since its last event.
+Result<Session> run_session(const SessionRequest& request, const EngineControl& control,
+                            const ProgressObserver& observer);
+
+}  // namespace plumbline::app
