@@ -59,6 +59,8 @@ int run(int argc, char** argv) {
   add_calibrate(program, invocation);
   add_evaluate(program, invocation);
   add_noise(program, invocation);
+  add_run(program, invocation);
+  add_dry_run(program, invocation);
   add_plan(program, invocation);
   add_runs(program, invocation);
   add_export(program, invocation);

@@ -22,6 +22,8 @@ struct Invocation {
 void add_calibrate(CLI::App& program, Invocation& invocation);
 void add_evaluate(CLI::App& program, Invocation& invocation);
 void add_noise(CLI::App& program, Invocation& invocation);
+void add_run(CLI::App& program, Invocation& invocation);
+void add_dry_run(CLI::App& program, Invocation& invocation);
 void add_plan(CLI::App& program, Invocation& invocation);
 void add_runs(CLI::App& program, Invocation& invocation);
 void add_export(CLI::App& program, Invocation& invocation);

@@ -1,0 +1,94 @@
+// `plumbline dry-run`: a whole calibration of a simulated unit over real wires.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "app/command/command.h"
+#include "app/command/measure.h"
+#include "app/config/rig_description.h"
+#include "app/io/read_file.h"
+#include "app/sequencer/simulated_rig.h"
+
+extern const char kExampleRig[];    // app/examples/rig.toml
+extern const char kDefaultWorld[];  // rig/sim/worlds/default.toml
+
+namespace plumbline::app {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct DryRunArguments {
+  std::string out;
+  std::string config;
+  std::string world;
+  double speed = 60;
+  std::uint64_t seed = 1;
+};
+
+Result<RigDescription> rig_description(const DryRunArguments& arguments) {
+  if (arguments.config.empty()) {
+    return parse_rig_description(kExampleRig, "built-in rig.toml");
+  }
+  return read_rig_description(arguments.config);
+}
+
+Result<ExitCode> dry_run(const DryRunArguments& arguments) {
+  auto rig = rig_description(arguments);
+  if (!rig) return fail(rig.error());
+  std::string world = kDefaultWorld;
+  if (!arguments.world.empty()) {
+    auto text = read_file(arguments.world);
+    if (!text) return fail(text.error());
+    world = *std::move(text);
+  }
+  std::error_code error;
+  fs::create_directories(arguments.out, error);
+  if (error) {
+    return fail(ErrorCode::output,
+                fmt::format("{}: cannot be made a folder ({})", arguments.out, error.message()));
+  }
+  const auto simulated =
+      SimulatedRig::start({.world_toml = world, .speed = arguments.speed, .seed = arguments.seed});
+  if (!simulated) return fail(simulated.error());
+  rig->head.modbus = simulated->modbus();
+  rig->sensor.can = simulated->can();
+  // As often in the rig's time as on a real rig, as far as the machine allows.
+  const double poll_ms = static_cast<double>(rig->head.poll_interval.count()) / arguments.speed;
+  rig->head.poll_interval = std::chrono::milliseconds(std::max(1L, std::lround(poll_ms)));
+  fmt::print(stderr, "dry-run: simulated rig on {} and {}, {} times real time\n",
+             simulated->modbus(), simulated->can(), arguments.speed);
+  const std::string hint = fmt::format("plumbline dry-run --out {} (a new run)", arguments.out);
+  return measure_and_calibrate(
+      {.session = {.rig = *rig, .database = fs::path(arguments.out) / "run.db", .resume = false},
+       .out = arguments.out,
+       .seed = arguments.seed,
+       .resume_hint = hint});
+}
+
+}  // namespace
+
+void add_dry_run(CLI::App& program, Invocation& invocation) {
+  CLI::App* sub = program.add_subcommand(
+      "dry-run", "a whole calibration of a simulated unit over real wires, with certificate");
+  auto arguments = std::make_shared<DryRunArguments>();
+  sub->add_option("--out", arguments->out, "folder for run.db, results and certificate")
+      ->required();
+  sub->add_option("--config", arguments->config, "rig.toml instead of the built-in one");
+  sub->add_option("--world", arguments->world, "world.toml instead of the built-in one");
+  sub->add_option("--speed", arguments->speed, "world seconds in one second")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  sub->add_option("--seed", arguments->seed, "of everything random in the world and the results")
+      ->capture_default_str();
+  sub->callback([arguments, &invocation] {
+    invocation.action = [arguments] { return dry_run(*arguments); };
+  });
+}
+
+}  // namespace plumbline::app

@@ -1,0 +1,56 @@
+// `plumbline run`: a calibration on a real rig.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "app/command/command.h"
+#include "app/command/measure.h"
+#include "app/config/rig_description.h"
+#include "app/io/output_folder.h"
+
+namespace plumbline::app {
+
+namespace {
+
+struct RunArguments {
+  std::string config;
+  std::string serial;
+  std::string database;
+  std::string out;
+  bool resume = false;
+};
+
+Result<ExitCode> run(const RunArguments& arguments) {
+  auto rig = read_rig_description(arguments.config);
+  if (!rig) return fail(rig.error());
+  if (!arguments.serial.empty()) rig->run.dut.serial = arguments.serial;
+  // An unwritable place is refused before the hours of measuring, not after them.
+  if (auto folder = OutputFolder::prepare(arguments.out); !folder) return fail(folder.error());
+  const std::string hint =
+      fmt::format("plumbline run --resume --config {} --serial {} --db {} --out {}",
+                  arguments.config, rig->run.dut.serial, arguments.database, arguments.out);
+  return measure_and_calibrate(
+      {.session = {.rig = *rig, .database = arguments.database, .resume = arguments.resume},
+       .out = arguments.out,
+       .resume_hint = hint});
+}
+
+}  // namespace
+
+void add_run(CLI::App& program, Invocation& invocation) {
+  CLI::App* sub =
+      program.add_subcommand("run", "measure a unit on the rig, calibrate and certify it");
+  auto arguments = std::make_shared<RunArguments>();
+  sub->add_option("--config", arguments->config, "rig.toml")->required();
+  sub->add_option("--serial", arguments->serial, "of the unit, instead of the one in rig.toml")
+      ->required();
+  sub->add_option("--db", arguments->database, "run database, made when absent")->required();
+  sub->add_option("--out", arguments->out, "folder for results and certificate")->required();
+  sub->add_flag("--resume", arguments->resume, "go on with the unit's last unfinished run");
+  sub->callback(
+      [arguments, &invocation] { invocation.action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace plumbline::app
