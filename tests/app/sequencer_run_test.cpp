@@ -1,0 +1,278 @@
+// Whole runs against the real simulated rig: its own process, Modbus over TCP, CAN frames over a
+// Unix socket, an SQLite file.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <thread>
+
+#include "app/config/rig_description.h"
+#include "app/sequencer/session.h"
+#include "app/sequencer/simulated_rig.h"
+
+namespace plumbline::app {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+using storage::PoseKind;
+using storage::RunState;
+using testing::HasSubstr;
+
+constexpr double kSpeed = 100;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+const fs::path kWorlds = fs::path(PLUMBLINE_SOURCE_DIR) / "rig/sim/worlds";
+
+/// 4 × 3 positions, 2 verification poses, a soak of 20 s.
+constexpr const char* kSmallRig = R"(
+[dut]
+serial = "SIM-0001"
+[gravity]
+local_mps2 = 9.81012
+[grid]
+delta_deg = { start = 0, stop = 270, step = 90 }
+h_deg = { start = 0, stop = 40, step = 20 }
+[sensor.covariates]
+rh_pct = "ENV.Humidity"
+[plan]
+soak_s = 20
+samples_per_pose = 20
+verification_poses = 2
+)";
+constexpr std::size_t kSteps = 1 + 12 + 2;
+
+class SequencerRun : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (fs::temp_directory_path() / "plumbline-run-XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    configure(kSmallRig);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void configure(const std::string& text) {
+    auto rig = parse_rig_description(text, "rig.toml");
+    ASSERT_TRUE(rig.has_value()) << rig.error().message;
+    rig_ = *std::move(rig);
+    rig_.head.poll_interval = milliseconds{2};
+  }
+
+  void start_rig(const std::string& more_world = "") {
+    auto simulated = SimulatedRig::start(
+        {.world_toml = text_of(kWorlds / "white.toml") + more_world, .speed = kSpeed, .seed = 7});
+    ASSERT_TRUE(simulated.has_value()) << simulated.error().message;
+    simulated_ = std::make_unique<SimulatedRig>(*std::move(simulated));
+    rig_.head.modbus = simulated_->modbus();
+    rig_.sensor.can = simulated_->can();
+  }
+
+  fs::path database() const { return folder_ / "run.db"; }
+
+  Result<Session> run(bool resume = false, const ProgressObserver& observer = {}) {
+    return run_session({.rig = rig_, .database = database(), .resume = resume}, control_, observer);
+  }
+
+  storage::StoredRun stored(storage::RunId id = 1) {
+    auto store = storage::RunStore::open_read_only(database());
+    EXPECT_TRUE(store.has_value()) << store.error().message;
+    auto run = store->load(id);
+    EXPECT_TRUE(run.has_value()) << run.error().message;
+    return *std::move(run);
+  }
+
+  /// The head, asked by a second master after the run.
+  void expect_motors_at_rest() {
+    auto head = rig::make_dividing_head(rig_.head);
+    ASSERT_TRUE(head.has_value());
+    ASSERT_TRUE((*head)->connect().has_value());
+    const auto first = (*head)->status();
+    ASSERT_TRUE(first.has_value()) << first.error().message;
+    EXPECT_FALSE(first->moving);
+    std::this_thread::sleep_for(milliseconds{20});  // 2 s of the rig's time
+    const auto later = (*head)->status();
+    ASSERT_TRUE(later.has_value());
+    EXPECT_EQ(first->actual.delta_deg, later->actual.delta_deg);
+    EXPECT_EQ(first->actual.h_deg, later->actual.h_deg);
+    EXPECT_EQ(later->alarm[0], 0) << rig::alarm_text(later->alarm[0]);
+  }
+
+  fs::path folder_;
+  RigDescription rig_;
+  std::unique_ptr<SimulatedRig> simulated_;
+  EngineControl control_;
+};
+
+void expect_complete(const storage::StoredRun& run) {
+  EXPECT_EQ(run.summary.state, RunState::finished);
+  EXPECT_EQ(run.summary.poses, static_cast<long long>(kSteps));
+  EXPECT_EQ(run.soak.size(), 2000u);
+  ASSERT_EQ(run.grid.poses.size(), 12u);
+  ASSERT_EQ(run.verification.poses.size(), 2u);
+  EXPECT_EQ(run.grid.samples.size(), 240u);
+  // Snake: 0, 90, 180, 270, then back.
+  EXPECT_EQ(run.grid.poses[0].delta_deg, 0);
+  EXPECT_EQ(run.grid.poses[4].delta_deg, 270);
+  EXPECT_EQ(run.grid.poses[4].h_deg, 20);
+  EXPECT_EQ(run.grid.poses[11].delta_deg, 270);
+  EXPECT_EQ(run.grid.poses[11].h_deg, 40);
+  for (const Pose& pose : run.grid.poses) {
+    EXPECT_EQ(pose.count, 20u);
+    EXPECT_NEAR(run.grid.samples.delta_enc_deg[pose.first], pose.delta_deg, 0.005);
+    EXPECT_NEAR(run.grid.samples.h_enc_deg[pose.first], pose.h_deg, 0.005);
+    for (std::size_t i = pose.first + 1; i < pose.first + pose.count; ++i)
+      EXPECT_NEAR(run.grid.samples.t_s[i] - run.grid.samples.t_s[i - 1], 0.01, 1e-6);
+  }
+}
+
+TEST_F(SequencerRun, MeasuresThePlanIntoTheDatabase) {
+  start_rig();
+  const auto session = run();
+  ASSERT_TRUE(session.has_value()) << session.error().message;
+  ASSERT_TRUE(session->outcome.has_value()) << session->outcome.error().message;
+  const storage::StoredRun run = stored();
+  expect_complete(run);
+  EXPECT_EQ(run.summary.header.config_toml, kSmallRig);
+  // At rest before the first sample: the means differ between poses by far more than the samples
+  // within one, whose scatter is the 0.3 mV of the world.
+  const auto& ux = run.grid.samples.u_V[0];
+  for (const Pose& pose : run.grid.poses) {
+    const auto first = ux.begin() + static_cast<std::ptrdiff_t>(pose.first);
+    const auto last = first + static_cast<std::ptrdiff_t>(pose.count);
+    const double mean = std::accumulate(first, last, 0.0) / 20;
+    double square = 0;
+    for (auto u = first; u != last; ++u) square += (*u - mean) * (*u - mean) / 19;
+    EXPECT_LT(std::sqrt(square), 0.0006);
+    EXPECT_GT(std::sqrt(square), 0.0001);
+  }
+  ASSERT_FALSE(run.events.empty());
+  EXPECT_THAT(run.events.front().text, HasSubstr("idle"));
+  EXPECT_THAT(run.events.back().text, HasSubstr("finished"));
+  expect_motors_at_rest();
+}
+
+TEST_F(SequencerRun, StopsOnRequestAndResumes) {
+  start_rig();
+  const auto stopped = run(false, [this](const Progress& progress) {
+    if (progress.step == 6 && progress.state == EngineState::moving) control_.request_stop();
+  });
+  ASSERT_TRUE(stopped.has_value()) << stopped.error().message;
+  ASSERT_FALSE(stopped->outcome.has_value());
+  EXPECT_EQ(stopped->outcome.error().code, ErrorCode::rig);
+  EXPECT_THAT(stopped->outcome.error().message, HasSubstr("stopped on request"));
+  expect_motors_at_rest();
+  storage::StoredRun half = stored();
+  EXPECT_EQ(half.summary.state, RunState::stopped);
+  EXPECT_EQ(half.summary.poses, 6);
+
+  // The clock of a resumed run goes on although the node restarts.
+  simulated_.reset();
+  start_rig();
+  EngineControl go_on;
+  const auto resumed =
+      run_session({.rig = rig_, .database = database(), .resume = true}, go_on, {});
+  ASSERT_TRUE(resumed.has_value()) << resumed.error().message;
+  ASSERT_TRUE(resumed->outcome.has_value()) << resumed->outcome.error().message;
+  EXPECT_EQ(resumed->run, stopped->run);
+  const storage::StoredRun whole = stored();
+  expect_complete(whole);
+  for (std::size_t i = 1; i < whole.grid.samples.size(); ++i)
+    ASSERT_GT(whole.grid.samples.t_s[i], whole.grid.samples.t_s[i - 1]);
+
+  const auto again = run_session({.rig = rig_, .database = database(), .resume = true}, go_on, {});
+  ASSERT_FALSE(again.has_value());
+  EXPECT_EQ(again.error().code, ErrorCode::input);
+  EXPECT_THAT(again.error().message, HasSubstr("is finished"));
+}
+
+TEST_F(SequencerRun, RefusesToResumeAnotherPlan) {
+  start_rig();
+  control_.request_stop();
+  ASSERT_TRUE(run().has_value());
+  rig_.plan.samples_per_pose = 21;
+  const auto refused = run(true);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().code, ErrorCode::input);
+  EXPECT_THAT(refused.error().message, HasSubstr("another plan"));
+  rig_.plan.samples_per_pose = 20;
+  rig_.source += "# edited\n";
+  EXPECT_THAT(run(true).error().message, HasSubstr("another configuration"));
+  rig_.run.dut.serial = "OTHER";
+  EXPECT_THAT(run(true).error().message, HasSubstr("no run of OTHER"));
+}
+
+TEST_F(SequencerRun, RefusesAPlanBeyondTheDrivesLimits) {
+  configure(std::string(kSmallRig) + "order = \"spiral\"\n");
+  start_rig();
+  const auto session = run();
+  ASSERT_TRUE(session.has_value()) << session.error().message;
+  ASSERT_FALSE(session->outcome.has_value());
+  EXPECT_EQ(session->outcome.error().code, ErrorCode::input);
+  EXPECT_THAT(session->outcome.error().message, HasSubstr("above the soft limit of 369°"));
+}
+
+/// Runs to failure and returns how; the run must be closed in an intact database within 10 s.
+std::string failure(const Result<Session>& session, std::chrono::steady_clock::time_point start) {
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_TRUE(session.has_value());
+  if (!session) return session.error().message;
+  EXPECT_FALSE(session->outcome.has_value());
+  if (session->outcome) return "";
+  EXPECT_EQ(session->outcome.error().code, ErrorCode::rig);
+  return session->outcome.error().message;
+}
+
+TEST_F(SequencerRun, ModbusAbsent) {
+  start_rig();
+  rig_.head.modbus = "tcp:127.0.0.1:1";
+  const auto start = std::chrono::steady_clock::now();
+  const std::string message = failure(run(), start);
+  EXPECT_THAT(message, HasSubstr("tcp:127.0.0.1:1"));
+  EXPECT_EQ(stored().summary.state, RunState::failed);
+}
+
+TEST_F(SequencerRun, WrongUnitId) {
+  start_rig();
+  rig_.head.unit_id = {9, 9};
+  rig_.head.response_timeout = milliseconds{300};
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_THAT(failure(run(), start), HasSubstr("9"));
+  EXPECT_EQ(stored().summary.state, RunState::failed);
+}
+
+TEST_F(SequencerRun, SilentBus) {
+  start_rig();
+  rig_.sensor.silence_timeout = milliseconds{500};
+  const std::string path = rig_.sensor.can.substr(5);
+  bool halted = false;
+  const auto start = std::chrono::steady_clock::now();
+  const auto session = run(false, [&](const Progress& progress) {
+    if (progress.step < 3 || halted) return;
+    halted = kill(simulated_->process(), SIGSTOP) == 0;
+  });
+  kill(simulated_->process(), SIGCONT);
+  // A rig that stands still is silent on both wires; whichever is noticed first is named.
+  EXPECT_FALSE(failure(session, start).empty());
+  const storage::StoredRun run = stored();
+  EXPECT_EQ(run.summary.state, RunState::failed);
+  EXPECT_EQ(run.summary.poses, 3);
+}
+
+}  // namespace
+}  // namespace plumbline::app
