@@ -256,10 +256,10 @@ TEST_F(SequencerRun, WrongUnitId) {
   EXPECT_EQ(stored().summary.state, RunState::failed);
 }
 
-TEST_F(SequencerRun, SilentBus) {
+TEST_F(SequencerRun, RigStandsStill) {
   start_rig();
   rig_.sensor.silence_timeout = milliseconds{500};
-  const std::string path = rig_.sensor.can.substr(5);
+  rig_.head.response_timeout = milliseconds{300};
   bool halted = false;
   const auto start = std::chrono::steady_clock::now();
   const auto session = run(false, [&](const Progress& progress) {
