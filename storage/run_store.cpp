@@ -156,7 +156,7 @@ Result<RunId> RunStore::create_run(const RunHeader& header) {
 }
 
 Result<void> RunStore::commit_pose(RunId run, const PoseRecord& pose) {
-  const auto done = insert_pose(*impl_->database, run, pose);
+  auto done = insert_pose(*impl_->database, run, pose);
   if (!done && done.error().code == ErrorCode::storage) {
     return while_doing(done.error(), fmt::format("while storing pose {} of run {}; all poses "
                                                  "before it are safe",

@@ -45,8 +45,8 @@ class FailingVfs {
     static State the_state;
     return the_state;
   }
-  /// The real file lies directly behind in the memory that SQLite gives.
-  struct alignas(std::max_align_t) File {
+  /// The real file lies directly behind in the memory that SQLite gives (aligned to 8 bytes).
+  struct File {
     sqlite3_file base;
     sqlite3_io_methods methods;
   };
