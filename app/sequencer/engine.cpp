@@ -71,12 +71,13 @@ const char* to_string(EngineState state) {
 }
 
 Engine::Engine(rig::DividingHead& head, rig::Acquisition& acquisition, storage::RunStore& store,
-               const EngineControl& control, EngineOptions options, ProgressObserver observer)
+               const EngineControl& control, const EngineOptions& options,
+               ProgressObserver observer)
     : head_(head),
       acquisition_(acquisition),
       store_(store),
       control_(control),
-      options_(std::move(options)),
+      options_(options),
       observer_(std::move(observer)) {}
 
 tl::unexpected<Engine::Interruption> Engine::repeat(std::string why) {

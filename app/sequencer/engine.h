@@ -78,7 +78,8 @@ struct StartPoint {
 class Engine {
  public:
   Engine(rig::DividingHead& head, rig::Acquisition& acquisition, storage::RunStore& store,
-         const EngineControl& control, EngineOptions options, ProgressObserver observer = {});
+         const EngineControl& control, const EngineOptions& options,
+         ProgressObserver observer = {});
 
   /// Measures every step of the plan that is not committed yet, one commit per pose. Ends in the
   /// safe state whatever happens: motors stopped, the drive's watchdog off again, the run's state

@@ -89,6 +89,7 @@ Result<void> SimulatedRig::launch(const SimulatedRigOptions& options) {
                                     (folder_ / "ready.toml").string(),
                                     "--exit-with-parent"};
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
 
