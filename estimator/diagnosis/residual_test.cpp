@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "estimator/noise/chi_squared.h"
 
@@ -71,6 +72,59 @@ Eigen::MatrixXd structure_functions(const Eigen::MatrixXd& a, const Eigen::Matri
   return qr.householderQ() * Eigen::MatrixXd::Identity(n, qr.rank());
 }
 
+/// Degrees of freedom from which the noise along the structure functions is known: Satterthwaite's
+/// 2/relvar of tr(S·Σ)/q under the uncertainty of the estimated powers, S what the functions take.
+double noise_degrees_of_freedom(const NoisePool& pool, const PooledNoise& noise,
+                                const Eigen::MatrixXd& taken, double functions) {
+  // A slow term estimated at zero is uncertain all the same.
+  const std::vector<Eigen::Index> free = {kTermN, kTermB, kTermK};
+  Eigen::VectorXd slope(static_cast<Eigen::Index>(free.size()));
+  for (std::size_t i = 0; i < free.size(); ++i)
+    slope(static_cast<Eigen::Index>(i)) =
+        taken.cwiseProduct(pool.unit()[static_cast<std::size_t>(free[i])]).sum() / functions;
+  const Eigen::MatrixXd information = noise.information(free, free);
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::VectorXd right = scale.cwiseProduct(slope);
+  const double variance = right.dot(scaled.ldlt().solve(right));
+  return variance > 0 ? 2 / variance : 1e9;
+}
+
+/// Below this the noise is taken from what the structure functions leave.
+constexpr double kStructureSeen = 1e-3;
+
+/// Geometric mean times e: a p-value whatever the dependence of the two (Vovk & Wang, Biometrika
+/// 107, 2020).
+double merged(double first, double second) {
+  return std::min(1.0, std::exp(1.0) * std::sqrt(first) * std::sqrt(second));
+}
+
+/// The structure functions tested under one estimate of the noise.
+struct Judgement {
+  PooledNoise noise;
+  double p_structure = 1;
+  Eigen::MatrixXd P;  ///< projector of the columns that the noise was estimated beside
+};
+
+Judgement judge(const NoisePool& pool, PooledNoise noise, const Eigen::VectorXd& y,
+                const Eigen::MatrixXd& design, const Eigen::MatrixXd& functions,
+                Eigen::Index columns) {
+  Judgement result;
+  result.noise = std::move(noise);
+  const Eigen::MatrixXd before = make_projector(result.noise.covariance, design).P;
+  // The same with the functions, by the block form of the projector.
+  const Eigen::MatrixXd weighted = before * functions;
+  const Eigen::LDLT<Eigen::MatrixXd> normal(functions.transpose() * weighted);
+  const Eigen::MatrixXd taken = weighted * normal.solve(weighted.transpose());
+  const auto count = static_cast<double>(functions.cols());
+  if (functions.cols() > 0) {
+    const double dof = noise_degrees_of_freedom(pool, result.noise, taken, count);
+    result.p_structure = f_tail(y.dot(taken * y) / count, count, dof);
+  }
+  result.P = columns > design.cols() ? Eigen::MatrixXd(before - taken) : before;
+  return result;
+}
+
 }  // namespace
 
 Eigen::MatrixXd driver_means(const SampleTable& samples, const std::vector<Pose>& poses) {
@@ -99,27 +153,33 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   const Eigen::Index n = y.size();
   const Eigen::MatrixXd functions =
       structure_functions(input.specific_force, input.drivers, input.design);
-  // Structure must not be taken for noise: the noise is estimated from what the functions leave.
-  // With too few poses for that they are not tested.
-  const bool enough = n >= input.design.cols() + 3 * functions.cols();
-  Eigen::MatrixXd full = input.design;
-  if (enough) {
-    full.resize(n, input.design.cols() + functions.cols());
-    full << input.design, functions;
-  }
-  const NoisePool pool(noise, input.windows, y, full, input.extra_variance);
+  const NoisePool plain_pool(noise, input.windows, y, input.design, input.extra_variance);
+  const Judgement plain =
+      judge(plain_pool, plain_pool.pooled(), y, input.design, functions, input.design.cols());
   ResidualTestResult result;
-  result.noise = pool.pooled();
+  result.noise = plain.noise;
+  result.p_structure = plain.p_structure;
+  Eigen::MatrixXd P = plain.P;
+  if (n >= input.design.cols() + 3 * functions.cols()) {
+    // With the noise estimated beside the model alone, structure is partly taken for slow noise;
+    // beside the functions, too, slow noise is partly taken for structure. Both count.
+    Eigen::MatrixXd full(n, input.design.cols() + functions.cols());
+    full << input.design, functions;
+    const NoisePool rich_pool(noise, input.windows, y, full, input.extra_variance);
+    const Judgement rich =
+        judge(rich_pool, rich_pool.pooled(), y, input.design, functions, full.cols());
+    result.p_structure = merged(plain.p_structure, rich.p_structure);
+    if (result.p_structure < kStructureSeen) {
+      result.noise = rich.noise;
+      P = rich.P;
+    }
+  } else {
+    result.p_structure = 1;
+  }
   const Projector before = make_projector(result.noise.covariance, input.design);
   result.chi2 = y.dot(before.P * y);
   result.dof = static_cast<double>(n - input.design.cols());
-  const Projector after = make_projector(result.noise.covariance, full);
-  const Eigen::MatrixXd& P = after.P;
   const Eigen::VectorXd py = P * y;
-  const double left = y.dot(py);
-  if (enough)
-    result.p_structure =
-        chi_squared_tail(result.chi2 - left, static_cast<double>(functions.cols()));
 
   // Scatter from pose to pose: the score of an independent variance beside the noise, against its
   // expectation; a scaled χ² with the same two moments (Satterthwaite).

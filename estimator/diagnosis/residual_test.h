@@ -38,11 +38,13 @@ Eigen::MatrixXd driver_means(const SampleTable& samples, const std::vector<Pose>
 /// Tests "the model plus the identified noise is all there is".
 ///
 /// The slow noise terms, uncertain in a static record shorter than the run, are re-estimated from
-/// record and run together (reml.h), beside broad structure functions: monomials of the specific
-/// force up to degree 4, the way from the previous pose, scale drift, the drivers. p_structure is
-/// their joint χ²; p_excess and p_outlier judge what they leave. Fewer than p + 3 × functions poses
-/// leave p_structure at 1. Slow drift that none of them describes is taken for noise: it cannot be
-/// told from flicker and random walk. The three are combined by Bonferroni.
+/// record and run together (reml.h), twice: from all that the model leaves, and from what broad
+/// structure functions (monomials of the specific force up to degree 4, the way from the previous
+/// pose, scale drift, the drivers) leave besides. p_structure merges the two F values of
+/// these functions, with the freedom in which the noise is known; p_excess and p_outlier judge what
+/// is left. Fewer than p + 3 × functions poses leave p_structure at 1. Slow drift that none of the
+/// functions describes is taken for noise: it cannot be told from flicker and random walk. The
+/// three are combined by Bonferroni.
 ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInput& input);
 
 }  // namespace plumbline

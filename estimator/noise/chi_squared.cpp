@@ -25,6 +25,13 @@ double chi_squared_tail(double x, double dof) {
   return Eigen::numext::igammac(0.5 * dof, 0.5 * x);
 }
 
+double f_tail(double f, double dof1, double dof2) {
+  assert(dof1 > 0 && dof2 > 0);
+  if (!(f > 0)) return 1;
+  if (dof2 > kManyDegrees) return chi_squared_tail(f * dof1, dof1);
+  return Eigen::numext::betainc(0.5 * dof2, 0.5 * dof1, dof2 / (dof2 + dof1 * f));
+}
+
 double normal_two_sided_tail(double z) { return std::erfc(z / std::sqrt(2.0)); }
 
 double normal_quantile(double p) {

@@ -6,6 +6,9 @@ namespace plumbline {
 /// P(χ²_dof > x). dof > 0.
 double chi_squared_tail(double x, double dof);
 
+/// P(F > f) of the F distribution with dof1, dof2 > 0 degrees of freedom; χ² in the limit.
+double f_tail(double f, double dof1, double dof2);
+
 /// x with P(χ²_dof ≤ x) = p, 0 < p < 1, dof > 0 (not necessarily whole).
 double chi_squared_quantile(double p, double dof);
 

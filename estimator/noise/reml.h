@@ -36,6 +36,9 @@ class NoisePool {
   /// Σ of the window means at given powers.
   Eigen::MatrixXd covariance(const NoisePowers& power) const;
 
+  /// ∂Σ/∂power, one n×n matrix a term.
+  const std::array<Eigen::MatrixXd, kTermCount>& unit() const { return unit_; }
+
  private:
   struct Point;
   Point evaluate(const Eigen::Vector4d& power) const;
