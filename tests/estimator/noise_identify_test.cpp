@@ -44,9 +44,8 @@ TEST(CosineTransform, OrthonormalAndExactForOneCosine) {
   const std::vector<double> c = cosine_transform(record);
   ASSERT_EQ(c.size(), 60U);
   EXPECT_NEAR(c[0], 5 * std::sqrt(60.0), 1e-12);
-  EXPECT_NEAR(c[7], 2 * std::sqrt(30.0), 1e-12);
   for (std::size_t k = 1; k < 60; ++k)
-    if (k != 7) EXPECT_NEAR(c[k], 0, 1e-12) << k;
+    EXPECT_NEAR(c[k], k == 7 ? 2 * std::sqrt(30.0) : 0, 1e-12) << k;
 }
 
 TEST(IdentifyNoise, FindsTheTermsThatAreThere) {
