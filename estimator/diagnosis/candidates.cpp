@@ -1,0 +1,131 @@
+#include "estimator/diagnosis/candidates.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+
+namespace plumbline {
+
+CandidateList list_candidates(const VisitLog& log, const std::vector<const Effect*>& effects) {
+  CandidateList list;
+  for (const Effect* effect : effects) {
+    const std::size_t axes = effect->subject() == Subject::head ? 1 : kAxisCount;
+    const auto infos = effect->parameters();
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      // Hypotheses that free the same amplitudes are the same family.
+      std::vector<std::pair<std::vector<bool>, std::size_t>> families;
+      for (Hypothesis& hypothesis : effect->hypotheses(log, axis)) {
+        std::vector<bool> amplitudes;
+        for (std::size_t k = 0; k < infos.size(); ++k) {
+          amplitudes.push_back(infos[k].role == ParameterRole::amplitude && hypothesis.p[k] != 0);
+        }
+        auto family = std::find_if(families.begin(), families.end(),
+                                   [&](const auto& f) { return f.first == amplitudes; });
+        if (family == families.end()) {
+          family = families.insert(families.end(), {amplitudes, list.family_size.size()});
+          list.family_size.push_back(0);
+        }
+        ++list.family_size[family->second];
+        list.candidates.push_back({effect, axis, std::move(hypothesis), family->second});
+      }
+    }
+  }
+  return list;
+}
+
+namespace {
+
+// What the mean readings of all axes change by when `active` joins the model, V, 3n rows.
+Eigen::VectorXd response(const VisitLog& log, const EnlargedParameters& model,
+                         const PerAxis<Eigen::VectorXd>& without, const ActiveEffect& active) {
+  EnlargedParameters with = model;
+  with.effects.push_back(active);
+  const auto predicted = predict_means_V(log, with);
+  const Eigen::Index n = without[0].size();
+  Eigen::VectorXd change(3 * n);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    change.segment(static_cast<Eigen::Index>(i) * n, n) = predicted[i] - without[i];
+  }
+  return change;
+}
+
+}  // namespace
+
+CandidateDirections::CandidateDirections(const VisitLog& log, const CandidateList& list,
+                                         const PoseWhitening& whitening, const EnlargedFit& fit) {
+  const Eigen::Index rows = fit.whitened_residual.size();
+  {
+    const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
+    const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
+    model_basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(rows, scaled.cols());
+  }
+  // One column for each amplitude; an effect of shapes alone is one column as it stands.
+  std::vector<Eigen::VectorXd> columns;
+  std::vector<std::size_t> owner;
+  const auto without = predict_means_V(log, fit.parameters);
+  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
+    const Candidate& candidate = list.candidates[c];
+    const auto infos = candidate.effect->parameters();
+    ActiveEffect active = candidate.active();
+    std::vector<std::size_t> amplitudes;
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0) amplitudes.push_back(k);
+    }
+    if (amplitudes.empty()) {
+      columns.push_back(response(log, fit.parameters, without, active));
+      owner.push_back(c);
+    }
+    for (std::size_t amplitude : amplitudes) {
+      ActiveEffect single = active;
+      for (std::size_t other : amplitudes) {
+        if (other != amplitude) single.p[other] = 0;
+      }
+      columns.push_back(response(log, fit.parameters, without, single));
+      owner.push_back(c);
+    }
+  }
+  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    all.col(static_cast<Eigen::Index>(j)) = columns[j];
+  all = whitening.apply(all);
+  const Eigen::VectorXd before = all.colwise().norm();
+  all = project(all);
+
+  dof_.assign(list.candidates.size(), 0);
+  first_.assign(list.candidates.size(), 0);
+  basis_.resize(rows, all.cols());
+  Eigen::Index used = 0;
+  for (Eigen::Index j = 0; j < all.cols(); ++j) {
+    const std::size_t c = owner[static_cast<std::size_t>(j)];
+    if (dof_[c] == 0) first_[c] = used;
+    Eigen::VectorXd direction = all.col(j);
+    for (Eigen::Index k = first_[c]; k < used; ++k) {
+      direction -= basis_.col(k).dot(direction) * basis_.col(k);
+    }
+    // What is left of an absorbed effect is rounding, not evidence.
+    const double norm = direction.norm();
+    if (!(norm > 1e-3 * before(j)) || !(norm > 0)) continue;
+    basis_.col(used++) = direction / norm;
+    ++dof_[c];
+  }
+  basis_.conservativeResize(Eigen::NoChange, used);
+}
+
+Eigen::MatrixXd CandidateDirections::project(const Eigen::MatrixXd& whitened) const {
+  return whitened - model_basis_ * (model_basis_.transpose() * whitened);
+}
+
+Eigen::MatrixXd CandidateDirections::gains(const Eigen::MatrixXd& whitened) const {
+  const Eigen::MatrixXd squares = (basis_.transpose() * whitened).cwiseAbs2();
+  Eigen::MatrixXd gain =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(dof_.size()), whitened.cols());
+  for (std::size_t c = 0; c < dof_.size(); ++c) {
+    if (dof_[c] > 0) {
+      gain.row(static_cast<Eigen::Index>(c)) =
+          squares.middleRows(first_[c], dof_[c]).colwise().sum();
+    }
+  }
+  return gain;
+}
+
+}  // namespace plumbline

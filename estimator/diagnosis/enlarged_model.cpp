@@ -1,0 +1,211 @@
+#include "estimator/diagnosis/enlarged_model.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <cassert>
+#include <cmath>
+
+namespace plumbline {
+namespace {
+
+constexpr Eigen::Index kAxes = static_cast<Eigen::Index>(kAxisCount);
+
+// A step that changes the prediction well above rounding and well below curvature.
+double difference_step(const ParameterInfo& info, double value) {
+  if (info.role == ParameterRole::shape) return 1e-3 * std::max(std::abs(value), 1e-9);
+  // Amplitudes: terms of 1e-5 g, angles of 1e-5 degrees and the like.
+  return std::max(1e-3 * std::abs(value), 1e-6);
+}
+
+}  // namespace
+
+std::vector<std::size_t> axes_of(const ActiveEffect& active) {
+  if (active.effect->subject() == Subject::head) return {0, 1, 2};
+  return {active.axis};
+}
+
+ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis) {
+  ActiveEffect active{&effect, axis, hypothesis.p, {}};
+  const auto parameters = effect.parameters();
+  assert(parameters.size() == hypothesis.p.size());
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    active.free.push_back(parameters[k].role == ParameterRole::shape ||
+                          (parameters[k].role == ParameterRole::amplitude && hypothesis.p[k] != 0));
+  }
+  return active;
+}
+
+Eigen::Index EnlargedParameters::free_count() const {
+  Eigen::Index count = 4 * kAxes;
+  for (const ActiveEffect& active : effects) {
+    for (const bool is_free : active.free) count += is_free ? 1 : 0;
+  }
+  return count;
+}
+
+Eigen::VectorXd EnlargedParameters::free_values() const {
+  Eigen::VectorXd values(free_count());
+  Eigen::Index row = 0;
+  for (const auto& axis : twelve) {
+    values.segment<4>(row) = axis;
+    row += 4;
+  }
+  for (const ActiveEffect& active : effects) {
+    for (std::size_t k = 0; k < active.p.size(); ++k) {
+      if (active.free[k]) values(row++) = active.p[k];
+    }
+  }
+  return values;
+}
+
+void EnlargedParameters::set_free_values(const Eigen::VectorXd& values) {
+  assert(values.size() == free_count());
+  Eigen::Index row = 0;
+  for (auto& axis : twelve) {
+    axis = values.segment<4>(row);
+    row += 4;
+  }
+  for (ActiveEffect& active : effects) {
+    for (std::size_t k = 0; k < active.p.size(); ++k) {
+      if (active.free[k]) active.p[k] = values(row++);
+    }
+  }
+}
+
+PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
+                                         const EnlargedParameters& parameters) {
+  const std::size_t n = log.visits.size();
+  std::vector<Eigen::Vector3d> a_g(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    HeadGeometry head{log.visits[k].delta_rad, log.visits[k].h_rad};
+    for (const ActiveEffect& active : parameters.effects) {
+      if (active.effect->subject() == Subject::head) {
+        active.effect->displace(log, k, active.p.data(), head);
+      }
+    }
+    a_g[k] = specific_force_g(head, log.gamma);
+  }
+  PerAxis<Eigen::VectorXd> mean_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const Eigen::Vector4d& twelve = parameters.twelve[i];
+    const double K_ii = twelve(static_cast<Eigen::Index>(i));
+    mean_V[i].resize(static_cast<Eigen::Index>(n));
+    for (std::size_t k = 0; k < n; ++k) {
+      const double response_V = twelve.head<3>().dot(a_g[k]);
+      TermInput input{log, k, i, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+      double term_g = 0;
+      for (const ActiveEffect& active : parameters.effects) {
+        if (active.effect->subject() == Subject::sensor && active.axis == i) {
+          term_g += active.effect->term_g(input, active.p.data());
+        }
+      }
+      mean_V[i](static_cast<Eigen::Index>(k)) = twelve(3) + response_V + K_ii * term_g;
+    }
+  }
+  return mean_V;
+}
+
+namespace {
+
+Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& per_axis) {
+  const Eigen::Index n = per_axis[0].size();
+  Eigen::VectorXd all(kAxes * n);
+  for (Eigen::Index i = 0; i < kAxes; ++i)
+    all.segment(i * n, n) = per_axis[static_cast<std::size_t>(i)];
+  return all;
+}
+
+std::vector<double> difference_steps(const EnlargedParameters& parameters) {
+  std::vector<double> steps;
+  for (std::size_t i = 0; i < 4 * kAxisCount; ++i) steps.push_back(1e-6);
+  for (const ActiveEffect& active : parameters.effects) {
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < active.p.size(); ++k) {
+      if (active.free[k]) steps.push_back(difference_step(infos[k], active.p[k]));
+    }
+  }
+  return steps;
+}
+
+}  // namespace
+
+Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {
+  const Eigen::VectorXd centre = parameters.free_values();
+  const std::vector<double> steps = difference_steps(parameters);
+  Eigen::MatrixXd jacobian(kAxes * static_cast<Eigen::Index>(log.visits.size()), centre.size());
+  EnlargedParameters moved = parameters;
+  for (Eigen::Index j = 0; j < centre.size(); ++j) {
+    const double step = steps[static_cast<std::size_t>(j)];
+    Eigen::VectorXd values = centre;
+    values(j) = centre(j) + step;
+    moved.set_free_values(values);
+    const Eigen::VectorXd above = stacked(predict_means_V(log, moved));
+    values(j) = centre(j) - step;
+    moved.set_free_values(values);
+    jacobian.col(j) = (above - stacked(predict_means_V(log, moved))) / (2 * step);
+  }
+  return jacobian;
+}
+
+Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
+  Eigen::MatrixXd whitened(all.rows(), all.cols());
+  const Eigen::Index n = lower[0].rows();
+  for (Eigen::Index i = 0; i < kAxes; ++i) {
+    whitened.middleRows(i * n, n) =
+        lower[static_cast<std::size_t>(i)].triangularView<Eigen::Lower>().solve(
+            all.middleRows(i * n, n));
+  }
+  return whitened;
+}
+
+EnlargedFit fit_enlarged(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
+                         const PoseWhitening& whitening, const EnlargedParameters& start) {
+  constexpr int kMaxIterations = 20;
+  const Eigen::VectorXd measured = stacked(mean_V);
+  const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
+    return whitening.apply(measured - stacked(predict_means_V(log, parameters)));
+  };
+  EnlargedFit fit;
+  fit.parameters = start;
+  fit.whitened_residual = whitened_residual(start);
+  fit.chi2 = fit.whitened_residual.squaredNorm();
+  for (int iteration = 0; iteration < kMaxIterations && !fit.converged; ++iteration) {
+    fit.whitened_jacobian = whitening.apply(prediction_jacobian(log, fit.parameters));
+    const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
+    fit.determined = norms.minCoeff() > 0;
+    if (!fit.determined) return fit;
+    const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+    const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
+    fit.determined = diagonal.minCoeff() > 1e-7 * diagonal.maxCoeff();
+    if (!fit.determined) return fit;
+
+    const Eigen::VectorXd step = norms.cwiseInverse().cwiseProduct(qr.solve(fit.whitened_residual));
+    double share = 1;
+    bool improved = false;
+    for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
+      EnlargedParameters trial = fit.parameters;
+      trial.set_free_values(fit.parameters.free_values() + share * step);
+      const Eigen::VectorXd residual = whitened_residual(trial);
+      const double chi2 = residual.squaredNorm();
+      if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;
+      improved = true;
+      fit.converged = fit.chi2 - chi2 < 1e-6;
+      fit.parameters = trial;
+      fit.whitened_residual = residual;
+      fit.chi2 = chi2;
+    }
+    if (!improved) fit.converged = true;  // no direction leads down any more
+  }
+  const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
+  const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
+  const Eigen::MatrixXd r = qr.matrixQR().topRows(scaled.cols()).triangularView<Eigen::Upper>();
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(r.rows(), r.cols());
+  r.triangularView<Eigen::Upper>().solveInPlace(inverse);
+  inverse = norms.cwiseInverse().asDiagonal() * inverse;
+  fit.covariance = inverse * inverse.transpose();
+  return fit;
+}
+
+}  // namespace plumbline

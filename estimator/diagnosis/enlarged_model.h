@@ -1,0 +1,66 @@
+// The 12-parameter model enlarged by effects: predicted pose means and their joint estimation.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "estimator/calibrate.h"
+#include "estimator/effects/effect.h"
+
+namespace plumbline {
+
+/// An effect that takes part in the model.
+struct ActiveEffect {
+  const Effect* effect = nullptr;
+  std::size_t axis = 0;    ///< of a sensor effect
+  std::vector<double> p;   ///< values, in the order of effect->parameters()
+  std::vector<bool> free;  ///< which of them are estimated
+};
+
+/// Axes whose readings the effect changes: one for a sensor effect, all three for the head.
+std::vector<std::size_t> axes_of(const ActiveEffect& active);
+/// Free are the amplitudes that are not zero and the shapes; indices stay.
+ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis);
+
+/// All parameters of the enlarged model.
+struct EnlargedParameters {
+  PerAxis<Eigen::Vector4d> twelve{};  ///< [K_ix K_iy K_iz U_i0], V/g and V
+  std::vector<ActiveEffect> effects;
+
+  /// 12 + free effect parameters.
+  Eigen::Index free_count() const;
+  Eigen::VectorXd free_values() const;
+  void set_free_values(const Eigen::VectorXd& values);
+};
+
+/// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
+PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
+
+/// Derivatives of the stacked prediction (x, then y, then z; 3n rows) by the free parameters, by
+/// central differences with steps fitted to each parameter's size.
+Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters);
+
+/// n × n lower Cholesky factors of the pose-mean covariance per axis.
+struct PoseWhitening {
+  PerAxis<Eigen::MatrixXd> lower;
+  /// L⁻¹ applied to each axis's block of a 3n-row matrix.
+  Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
+};
+
+struct EnlargedFit {
+  EnlargedParameters parameters;
+  Eigen::MatrixXd covariance;         ///< of the free parameters
+  Eigen::VectorXd whitened_residual;  ///< 3n
+  Eigen::MatrixXd whitened_jacobian;  ///< 3n × free
+  double chi2 = 0;
+  bool converged = false;
+  bool determined = true;  ///< no direction of the free parameters is unobservable
+};
+
+/// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
+/// factorisation). mean_V: the measured pose means.
+EnlargedFit fit_enlarged(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
+                         const PoseWhitening& whitening, const EnlargedParameters& start);
+
+}  // namespace plumbline

@@ -1,0 +1,62 @@
+// Which effects does the residual show? Forward selection with joint re-estimation, backward
+// elimination, and a p-value for the search as a whole.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "estimator/diagnosis/candidates.h"
+#include "estimator/noise/covariance.h"
+#include "estimator/noise/noise_model.h"
+#include "estimator/noise/reml.h"
+
+namespace plumbline {
+
+struct SearchOptions {
+  std::uint64_t seed = 1;
+  double false_alarm = 0.003;  ///< chance that noise alone makes the search claim an effect
+  int replicates = 400;        ///< of simulated noise, for the look-elsewhere correction
+  std::size_t max_effects = 6;
+};
+
+/// The data of a search; n visits.
+struct SearchInput {
+  const VisitLog& log;
+  const PerAxis<Eigen::VectorXd>& mean_V;  ///< n pose means
+  const PerAxis<NoiseModel>& noise;
+  const std::vector<SampleWindow>& windows;           ///< n
+  const PerAxis<Eigen::VectorXd>& extra_variance_V2;  ///< n known variances (positioning), or empty
+  EnlargedParameters start;                           ///< the 12 parameters, no effects
+};
+
+/// One effect in the model, and what speaks for it.
+struct Evidence {
+  Candidate candidate;
+  double chi2_gain = 0;  ///< loss of fit when it alone is taken out of the final model
+  double p_local = 1;    ///< of its own family
+  double p_value = 1;    ///< of the whole search
+};
+
+/// A hypothesis compared in the first step, for the picture of the ten best.
+struct RankedCandidate {
+  Candidate candidate;
+  double log10_p = 0;
+};
+
+struct SearchResult {
+  EnlargedFit fit;  ///< 12 parameters and the effects, in the order of `evidence`
+  std::vector<Evidence> evidence;
+  PerAxis<PooledNoise> noise;  ///< re-estimated under the final model
+  PoseWhitening whitening;
+  std::vector<RankedCandidate> ranking;  ///< of the first step, best first, one per family
+  double p_best_rest = 1;                ///< p-value of the best candidate that was not taken
+};
+
+/// Deterministic in input and options.
+SearchResult search_effects(const SearchInput& input, const CandidateList& list,
+                            const SearchOptions& options);
+
+/// log of P(χ²_dof > x), also where the probability itself is no longer a double.
+double log_chi_squared_tail(double x, double dof);
+
+}  // namespace plumbline

@@ -1,0 +1,51 @@
+#include "estimator/effects/covariate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+class CovariateEffect final : public Effect {
+ public:
+  CovariateEffect(std::string column, std::size_t index, bool scale)
+      : column_(std::move(column)), index_(index), scale_(scale) {}
+
+  std::string id() const override { return "covariate:" + column_; }
+  Subject subject() const override { return Subject::sensor; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"c", scale_ ? "1/unit" : "g/unit", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    double largest = 0;
+    for (const Visit& visit : log.visits) {
+      largest = std::max(largest, std::abs(visit.covariate[index_]));
+    }
+    if (!(largest > 0)) return {};
+    return {{{effect::kSmallTerm / largest}}};
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    const double value = p[0] * input.at().covariate[index_];
+    return scale_ ? value * input.a() : value;
+  }
+
+ private:
+  std::string column_;
+  std::size_t index_;
+  bool scale_;
+};
+
+}  // namespace
+
+std::vector<std::unique_ptr<Effect>> covariate_effects(const VisitLog& log) {
+  std::vector<std::unique_ptr<Effect>> effects;
+  for (std::size_t c = 0; c < log.covariate_names.size(); ++c) {
+    for (bool scale : {false, true}) {
+      effects.push_back(std::make_unique<CovariateEffect>(log.covariate_names[c], c, scale));
+    }
+  }
+  return effects;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,29 @@
+#include "estimator/effects/effect.h"
+
+#include <cmath>
+
+namespace plumbline {
+
+void Effect::displace(const VisitLog&, std::size_t, const double*, HeadGeometry&) const {}
+
+double Effect::term_g(const TermInput&, const double*) const { return 0; }
+
+namespace effect {
+
+double mean_decay(const Visit& visit, double origin_s, double tau_s) {
+  const double first = std::exp(-(visit.t_arrival_s - origin_s) / tau_s);
+  const double ratio = std::exp(-visit.step_s / tau_s);
+  const auto n = static_cast<double>(visit.count);
+  if (visit.count < 2 || 1 - ratio < 1e-12) return first;
+  return first * (1 - std::pow(ratio, n)) / (n * (1 - ratio));
+}
+
+std::vector<double> geometric(double first, double last, int count) {
+  std::vector<double> values;
+  for (int k = 0; k < count; ++k)
+    values.push_back(first * std::pow(last / first, k / (count - 1.0)));
+  return values;
+}
+
+}  // namespace effect
+}  // namespace plumbline

@@ -1,0 +1,105 @@
+// What the 12-parameter model lacks, one effect at a time.
+//
+// An effect is one file of this folder: its id, its parameters with units, its response in full
+// (not linearised), and where a search has to start. catalogue.h lists them; nothing else names
+// one.
+//
+// Parameter values are handed over as `p[0], p[1] …` in the order of parameters().
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "estimator/effects/visit_log.h"
+
+namespace plumbline {
+
+/// How the response depends on a parameter, and so how it is searched and refined.
+enum class ParameterRole {
+  amplitude,  ///< zero means no effect; estimated, its uncertainty comes from the fit
+  shape,      ///< continuous but nonlinear (a time constant); searched on a grid, then refined
+  index,      ///< discrete (a pose, a harmonic, a bit); searched over all its values
+};
+
+struct ParameterInfo {
+  std::string name;  ///< as in result.json
+  std::string unit;
+  ParameterRole role = ParameterRole::amplitude;
+};
+
+/// Where the search begins: shapes and indices at given values, amplitudes at a small typical size
+/// (the sign is free). Amplitudes that are zero here stay out of this hypothesis.
+struct Hypothesis {
+  std::vector<double> p;
+};
+
+enum class Subject {
+  head,    ///< changes the geometry: seen by all three axes through one set of numbers
+  sensor,  ///< changes the reading of one axis
+};
+
+/// The state of one axis at one visit that a term may depend on.
+struct TermInput {
+  const VisitLog& log;
+  std::size_t visit;
+  std::size_t axis;
+  const std::vector<Eigen::Vector3d>& a_g;  ///< specific force at every visit, geometry included
+  double response_g;                        ///< Σ_j K_ij·a_j / K_ii at this visit
+  double output_V;                          ///< U_i0 + Σ_j K_ij·a_j
+  double K_V_per_g;                         ///< K_ii
+
+  const Visit& at() const { return log.visits[visit]; }
+  double a() const { return a_g[visit](static_cast<Eigen::Index>(axis)); }
+};
+
+/// Stateless and immutable.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+  virtual std::string id() const = 0;
+  virtual Subject subject() const = 0;
+  virtual std::vector<ParameterInfo> parameters() const = 0;
+  /// Starting points on these data for `axis` (0 for the head); empty when the data cannot show the
+  /// effect at all (no temperature recorded, say).
+  virtual std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const = 0;
+  /// Head: moves the geometry of visit `visit`.
+  virtual void displace(const VisitLog& log, std::size_t visit, const double* p,
+                        HeadGeometry& head) const;
+  /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
+  virtual double term_g(const TermInput& input, const double* p) const;
+  /// What belonged to one run only does not carry over to another set of the same unit.
+  virtual bool carries_over() const { return true; }
+};
+
+/// Helpers that several effects share.
+namespace effect {
+
+inline constexpr double kRadPerDeg = 0.017453292519943295;
+/// Typical sizes that a search starts from, small against 1 g.
+inline constexpr double kSmallTerm = 1e-3;
+inline constexpr double kSmallAngle_deg = 0.02;
+
+/// Mean over the dwell of exp(−(t − origin)/τ), in closed form for even spacing.
+double mean_decay(const Visit& visit, double origin_s, double tau_s);
+/// `count` values from `first` to `last` in equal ratios.
+std::vector<double> geometric(double first, double last, int count);
+/// Mean of f(u + noise) over Gaussian noise of standard deviation `sd`: what averaging many
+/// readings leaves of a step in f.
+template <class Function>
+double mean_over_noise(Function f, double u, double sd) {
+  // Midpoints of equal parts of the normal distribution: robust where f jumps, unlike
+  // Gauss–Hermite.
+  static constexpr double kQuantile[] = {-1.959964, -1.439531, -1.150349, -0.934589, -0.755415,
+                                         -0.597760, -0.453762, -0.318639, -0.189118, -0.062707,
+                                         0.062707,  0.189118,  0.318639,  0.453762,  0.597760,
+                                         0.755415,  0.934589,  1.150349,  1.439531,  1.959964};
+  double sum = 0;
+  for (double q : kQuantile) sum += f(u + q * sd);
+  return sum / static_cast<double>(std::size(kQuantile));
+}
+
+}  // namespace effect
+
+}  // namespace plumbline

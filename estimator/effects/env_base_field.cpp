@@ -1,0 +1,39 @@
+#include <cmath>
+
+#include "estimator/effects/effect.h"
+
+namespace plumbline {
+namespace {
+
+// A field fixed to the base, magnetic say: m1·e1_i + m2·e2_i with e1 = x_b and e2 = y_b seen in the
+// sensor frame.
+class BaseField final : public Effect {
+ public:
+  std::string id() const override { return "env.base_field"; }
+  Subject subject() const override { return Subject::sensor; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"m1", "g", ParameterRole::amplitude}, {"m2", "g", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    // The spindle axis never sees y_b.
+    if (axis == 2) return {{{effect::kSmallTerm, 0}}};
+    return {{{effect::kSmallTerm, effect::kSmallTerm}}};
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    const Visit& visit = input.at();
+    const double sh = std::sin(visit.h_rad), ch = std::cos(visit.h_rad);
+    const double sd = std::sin(visit.delta_rad), cd = std::cos(visit.delta_rad);
+    const double e1[] = {-sh * cd, sh * sd, ch};
+    const double e2[] = {-sd, -cd, 0};
+    return p[0] * e1[input.axis] + p[1] * e2[input.axis];
+  }
+};
+
+}  // namespace
+
+const Effect& env_base_field() {
+  static const BaseField instance;
+  return instance;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,41 @@
+#include <cmath>
+
+#include "estimator/effects/effect.h"
+
+namespace plumbline {
+namespace {
+
+// Periodic error of the spindle drive: δ += c·cos nδ + s·sin nδ, 3 ≤ n ≤ 17. On a grid of 36 steps
+// n stands for its alias class n + 36k.
+class DeltaPeriodic final : public Effect {
+ public:
+  std::string id() const override { return "rig.delta_periodic"; }
+  Subject subject() const override { return Subject::head; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"n", "", ParameterRole::index},
+            {"c", "deg", ParameterRole::amplitude},
+            {"s", "deg", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    std::vector<Hypothesis> starts;
+    for (int n = 3; n <= 17; ++n) {
+      starts.push_back(
+          {{static_cast<double>(n), effect::kSmallAngle_deg, effect::kSmallAngle_deg}});
+    }
+    return starts;
+  }
+  void displace(const VisitLog& log, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    const double phase = p[0] * log.visits[visit].delta_rad;
+    head.delta_rad += (p[1] * std::cos(phase) + p[2] * std::sin(phase)) * effect::kRadPerDeg;
+  }
+};
+
+}  // namespace
+
+const Effect& rig_delta_periodic() {
+  static const DeltaPeriodic instance;
+  return instance;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,111 @@
+#include "estimator/effects/visit_log.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace plumbline {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180;
+
+double mean_of(const std::vector<double>& column, const Pose& pose) {
+  const auto begin = column.begin() + static_cast<std::ptrdiff_t>(pose.first);
+  return std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(pose.count), 0.0) /
+         static_cast<double>(pose.count);
+}
+
+// Scatter within the dwells from differences of neighbours, which slow drifts do not enter.
+double white_sd(const std::vector<double>& u, const std::vector<Pose>& poses) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const Pose& pose : poses) {
+    for (std::size_t k = pose.first + 1; k < pose.first + pose.count; ++k) {
+      sum += (u[k] - u[k - 1]) * (u[k] - u[k - 1]);
+      ++count;
+    }
+  }
+  return count == 0 ? 0 : std::sqrt(sum / (2 * static_cast<double>(count)));
+}
+
+double smallest_step(std::vector<double> u) {
+  std::sort(u.begin(), u.end());
+  double step = 0;
+  for (std::size_t k = 1; k < u.size(); ++k) {
+    const double difference = u[k] - u[k - 1];
+    // Readings printed with few digits differ by rounding of the text; that is no step.
+    if (difference > 1e-9 * std::abs(u[k]) && (step == 0 || difference < step)) step = difference;
+  }
+  return step;
+}
+
+}  // namespace
+
+VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {
+  assert(set.has_angles);
+  const SampleTable& samples = set.samples;
+  VisitLog log;
+  log.gamma = description.gravity.local_mps2 / kStandardGravity_mps2;
+  log.adc = description.adc;
+  log.has_temperature = !samples.temp_C.empty();
+  std::vector<double> covariate_mean;
+  for (const Covariate& covariate : samples.covariates) {
+    log.covariate_names.push_back(covariate.name);
+  }
+  int direction = 0;
+  for (const Pose& pose : set.poses) {
+    assert(pose.count > 0);
+    Visit visit;
+    visit.delta_rad = pose.delta_deg * kRadPerDeg;
+    visit.h_rad = pose.h_deg * kRadPerDeg;
+    visit.count = pose.count;
+    visit.t_arrival_s = samples.t_s[pose.first];
+    visit.step_s = pose.count > 1 ? (samples.t_s[pose.first + pose.count - 1] - visit.t_arrival_s) /
+                                        static_cast<double>(pose.count - 1)
+                                  : 0;
+    visit.t_mean_s = mean_of(samples.t_s, pose);
+    if (log.has_temperature) {
+      visit.temperature_K = mean_of(samples.temp_C, pose) - description.reference_C;
+    }
+    if (!log.visits.empty()) {
+      const double turn = visit.delta_rad - log.visits.back().delta_rad;
+      if (turn != 0) direction = turn > 0 ? 1 : -1;
+    }
+    visit.delta_direction = direction;
+    for (const Covariate& covariate : samples.covariates) {
+      visit.covariate.push_back(mean_of(covariate.value, pose));
+    }
+    log.visits.push_back(std::move(visit));
+  }
+  for (std::size_t c = 0; c < log.covariate_names.size(); ++c) {
+    double mean = 0;
+    for (const Visit& visit : log.visits) mean += visit.covariate[c];
+    mean /= static_cast<double>(log.visits.size());
+    for (Visit& visit : log.visits) visit.covariate[c] -= mean;
+  }
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    log.sample_sd_V[i] = white_sd(samples.u_V[i], set.poses);
+    log.smallest_step_V[i] = smallest_step(samples.u_V[i]);
+    const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
+    log.lowest_V[i] = *low;
+    log.highest_V[i] = *high;
+  }
+  return log;
+}
+
+Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma) {
+  const double ch = std::cos(head.h_rad), sh = std::sin(head.h_rad);
+  const double cd = std::cos(head.delta_rad), sd = std::sin(head.delta_rad);
+  const double ce = std::cos(head.roll_rad), se = std::sin(head.roll_rad);
+  const double cn = std::cos(head.skew_rad), sn = std::sin(head.skew_rad);
+  // The plumb line along the triad's axes at δ = 0: x and y in the plane of the turntable, z along
+  // the spindle.
+  const double up_x = ch * ce;
+  const double up_y = sn * sh * ce - cn * se;
+  const double up_z = cn * sh * ce + sn * se;
+  return gamma * Eigen::Vector3d(up_x * cd + up_y * sd, -up_x * sd + up_y * cd, up_z);
+}
+
+}  // namespace plumbline
