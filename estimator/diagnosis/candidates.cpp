@@ -2,32 +2,49 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <utility>
+
+#include "estimator/effects/catalogue.h"
+#include "estimator/effects/covariate.h"
+#include "estimator/effects/smooth_term.h"
 
 namespace plumbline {
 
-CandidateList list_candidates(const VisitLog& log, const std::vector<const Effect*>& effects) {
-  CandidateList list;
-  for (const Effect* effect : effects) {
-    const std::size_t axes = effect->subject() == Subject::head ? 1 : kAxisCount;
-    const auto infos = effect->parameters();
-    for (std::size_t axis = 0; axis < axes; ++axis) {
-      // Hypotheses that free the same amplitudes are the same family.
-      std::vector<std::pair<std::vector<bool>, std::size_t>> families;
-      for (Hypothesis& hypothesis : effect->hypotheses(log, axis)) {
-        std::vector<bool> amplitudes;
-        for (std::size_t k = 0; k < infos.size(); ++k) {
-          amplitudes.push_back(infos[k].role == ParameterRole::amplitude && hypothesis.p[k] != 0);
-        }
-        auto family = std::find_if(families.begin(), families.end(),
-                                   [&](const auto& f) { return f.first == amplitudes; });
-        if (family == families.end()) {
-          family = families.insert(families.end(), {amplitudes, list.family_size.size()});
-          list.family_size.push_back(0);
-        }
-        ++list.family_size[family->second];
-        list.candidates.push_back({effect, axis, std::move(hypothesis), family->second});
+void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
+                    double handicap) {
+  const std::size_t axes = effect.subject() == Subject::head ? 1 : kAxisCount;
+  const auto infos = effect.parameters();
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    // Hypotheses that free the same amplitudes are the same family.
+    std::vector<std::pair<std::vector<bool>, std::size_t>> families;
+    for (Hypothesis& hypothesis : effect.hypotheses(log, axis)) {
+      std::vector<bool> amplitudes;
+      for (std::size_t k = 0; k < infos.size(); ++k) {
+        amplitudes.push_back(infos[k].role == ParameterRole::amplitude && hypothesis.p[k] != 0);
       }
+      auto family = std::find_if(families.begin(), families.end(),
+                                 [&](const auto& f) { return f.first == amplitudes; });
+      if (family == families.end()) {
+        family = families.insert(families.end(), {amplitudes, list.family_size.size()});
+        list.family_size.push_back(0);
+      }
+      ++list.family_size[family->second];
+      list.candidates.push_back({&effect, axis, std::move(hypothesis), family->second, handicap});
     }
+  }
+}
+
+CandidateList all_candidates(const VisitLog& log) {
+  constexpr double kUnnamed = 7;
+  CandidateList list;
+  for (const Effect* effect : effect_catalogue()) add_candidates(list, log, *effect);
+  for (auto& effect : covariate_effects(log)) {
+    list.owned.push_back(std::move(effect));
+    add_candidates(list, log, *list.owned.back());
+  }
+  for (auto& term : smooth_terms(log)) {
+    list.owned.push_back(std::move(term));
+    add_candidates(list, log, *list.owned.back(), kUnnamed);
   }
   return list;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "estimator/diagnosis/enlarged_model.h"
@@ -14,16 +15,26 @@ struct Candidate {
   std::size_t axis = 0;
   Hypothesis hypothesis;
   std::size_t family = 0;  ///< hypotheses that differ only in shapes and indices share one
+  double handicap = 0;     ///< log-probability by which it must beat those without
 
   ActiveEffect active() const { return activate(*effect, axis, hypothesis); }
 };
 
-/// All hypotheses of `effects` on these visits.
+/// All hypotheses on these visits. Owns the effects that exist for these data only (recorded
+/// columns, smooth terms), so it must outlive every model that they became part of.
 struct CandidateList {
   std::vector<Candidate> candidates;
   std::vector<std::size_t> family_size;
+  std::vector<std::shared_ptr<const Effect>> owned;
 };
-CandidateList list_candidates(const VisitLog& log, const std::vector<const Effect*>& effects);
+
+/// Adds all hypotheses of one effect.
+void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
+                    double handicap = 0);
+
+/// The catalogue, every recorded column, and smooth terms in every variable. A term without a name
+/// must be e^7 times as likely as one with a name: a polynomial can imitate much.
+CandidateList all_candidates(const VisitLog& log);
 
 /// What each candidate would add to a fitted model, orthonormal and free of everything that the
 /// model's own parameters can take up.

@@ -100,7 +100,7 @@ double p_of_search(double log_p_local, double looks) {
 struct Scored {
   std::size_t candidate = 0;
   double log_p = 0;  ///< of its own test
-  double score = 0;  ///< log_p plus the price of a large family
+  double score = 0;  ///< log_p plus the price of a large family and of having no name
 };
 
 // Best hypothesis of each family by the first-order gain, best family first.
@@ -113,7 +113,8 @@ std::vector<Scored> screen(const CandidateList& list, const CandidateDirections&
     const std::size_t family = list.candidates[c].family;
     const double log_p =
         log_chi_squared_tail(gains(static_cast<Eigen::Index>(c)), directions.dof(c));
-    const double score = log_p + std::log(static_cast<double>(list.family_size[family]));
+    const double score = log_p + std::log(static_cast<double>(list.family_size[family])) +
+                         list.candidates[c].handicap;
     if (score < best[family].score) best[family] = {c, log_p, score};
   }
   std::erase_if(best, [](const Scored& s) { return !std::isfinite(s.score); });

@@ -1,0 +1,127 @@
+#include "estimator/diagnosis/alternatives.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace plumbline {
+namespace {
+
+// Odds of 100 to 1: twice the logarithm of it.
+constexpr double kIndistinguishable = 9.2;
+// What a further parameter must gain to be worth naming; about 2·ln of the number of poses.
+constexpr double kPricePerParameter = 6;
+constexpr std::size_t kLongestSum = 3;
+constexpr std::size_t kRefined = 16;
+
+struct Rival {
+  std::size_t candidate = 0;
+  double gain = 0;  ///< first order
+};
+
+// Best hypothesis of each family, largest gain first.
+std::vector<Rival> best_of_families(const CandidateList& list,
+                                    const CandidateDirections& directions,
+                                    const Eigen::VectorXd& gains) {
+  std::vector<Rival> best(list.family_size.size(), {0, -1});
+  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
+    if (directions.dof(c) == 0) continue;
+    Rival& family = best[list.candidates[c].family];
+    const double gain = gains(static_cast<Eigen::Index>(c));
+    if (gain > family.gain) family = {c, gain};
+  }
+  std::erase_if(best, [](const Rival& r) { return r.gain < 0; });
+  std::sort(best.begin(), best.end(),
+            [](const Rival& a, const Rival& b) { return a.gain > b.gain; });
+  return best;
+}
+
+bool same_effect(const Candidate& a, const Candidate& b) {
+  return a.effect == b.effect && (a.effect->subject() == Subject::head || a.axis == b.axis);
+}
+
+EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
+                       const EnlargedParameters& base, const std::vector<Candidate>& added) {
+  EnlargedParameters model = base;
+  for (const Candidate& candidate : added) model.effects.push_back(candidate.active());
+  return fit_enlarged(input.log, input.mean_V, result.whitening, model);
+}
+
+}  // namespace
+
+std::vector<std::string> find_alternatives(const SearchInput& input, const CandidateList& list,
+                                           const SearchResult& result, std::size_t index) {
+  const Candidate& found = result.evidence[index].candidate;
+  EnlargedParameters base = result.fit.parameters;
+  base.effects.erase(base.effects.begin() + static_cast<std::ptrdiff_t>(index));
+  const EnlargedFit without = fit_enlarged(input.log, input.mean_V, result.whitening, base);
+  const double found_gain = without.chi2 - result.fit.chi2;
+  const auto found_free =
+      static_cast<double>(result.fit.parameters.free_count() - base.free_count());
+
+  const auto usable = [&](const Candidate& candidate) {
+    if (same_effect(candidate, found)) return false;
+    return std::none_of(result.evidence.begin(), result.evidence.end(),
+                        [&](const Evidence& e) { return same_effect(e.candidate, candidate); });
+  };
+  const auto needed = [&](double free) {
+    return found_gain - kIndistinguishable + kPricePerParameter * (free - found_free);
+  };
+
+  std::vector<std::pair<double, std::string>> singles;
+  const CandidateDirections directions(input.log, list, result.whitening, without);
+  const auto ranked =
+      best_of_families(list, directions, directions.gains(without.whitened_residual).col(0));
+  std::size_t refined = 0;
+  for (const Rival& rival : ranked) {
+    const Candidate& candidate = list.candidates[rival.candidate];
+    if (!usable(candidate)) continue;
+    // The first order may understate a nonlinear rival, but not by this much.
+    if (++refined > kRefined || rival.gain < 0.5 * found_gain - kIndistinguishable) break;
+    const EnlargedFit fit = refit_with(input, result, base, {candidate});
+    if (!fit.determined) continue;
+    const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
+    if (without.chi2 - fit.chi2 < needed(std::max(free, found_free))) continue;
+    const std::string id = candidate.effect->id();
+    if (std::none_of(singles.begin(), singles.end(),
+                     [&](const auto& s) { return s.second == id; })) {
+      singles.emplace_back(fit.chi2, id);
+    }
+  }
+  std::sort(singles.begin(), singles.end());
+  std::vector<std::string> names;
+  for (auto& [chi2, id] : singles) {
+    if (id != found.effect->id()) names.push_back(std::move(id));
+  }
+  if (!names.empty()) return names;
+
+  // A sum: always the rival that helps most, until it explains as much.
+  std::vector<Candidate> sum;
+  EnlargedFit fit = without;
+  while (sum.size() < kLongestSum) {
+    const CandidateDirections next(input.log, list, result.whitening, fit);
+    const auto order = best_of_families(list, next, next.gains(fit.whitened_residual).col(0));
+    const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {
+      const Candidate& candidate = list.candidates[r.candidate];
+      return usable(candidate) &&
+             std::none_of(sum.begin(), sum.end(),
+                          [&](const Candidate& member) { return same_effect(member, candidate); });
+    });
+    if (best == order.end()) break;
+    sum.push_back(list.candidates[best->candidate]);
+    fit = refit_with(input, result, base, sum);
+    if (!fit.determined) break;
+    const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
+    if (sum.size() < 2 || without.chi2 - fit.chi2 < needed(free)) continue;
+    std::vector<std::string> ids;
+    for (const Candidate& member : sum) ids.push_back(member.effect->id());
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    std::string name;
+    for (const std::string& id : ids) name += (name.empty() ? "" : "+") + id;
+    return {name};
+  }
+  return {};
+}
+
+}  // namespace plumbline

@@ -1,0 +1,160 @@
+#include "estimator/diagnosis/diagnose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/diagnosis/alternatives.h"
+#include "estimator/effects/smooth_term.h"
+
+namespace plumbline {
+namespace {
+
+// Standard uncertainties of one active effect's parameters; indices have none.
+std::vector<double> uncertainties(const EnlargedFit& fit, std::size_t effect) {
+  Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
+  for (std::size_t e = 0; e < effect; ++e) {
+    const auto& free = fit.parameters.effects[e].free;
+    row += std::count(free.begin(), free.end(), true);
+  }
+  const ActiveEffect& active = fit.parameters.effects[effect];
+  std::vector<double> u(active.p.size(), 0);
+  for (std::size_t k = 0; k < u.size(); ++k) {
+    if (active.free[k]) {
+      u[k] = std::sqrt(fit.covariance(row, row));
+      ++row;
+    }
+  }
+  return u;
+}
+
+std::vector<EffectParameter> report_parameters(const VisitLog& log, const EnlargedFit& fit,
+                                               std::size_t effect) {
+  const ActiveEffect& active = fit.parameters.effects[effect];
+  const auto infos = active.effect->parameters();
+  const std::vector<double> u = uncertainties(fit, effect);
+  std::vector<EffectParameter> reported;
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    // An amplitude that this hypothesis leaves out is no result.
+    if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
+    EffectParameter parameter{infos[k].name, std::nullopt, active.p[k], u[k], infos[k].unit};
+    if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
+    if (infos[k].role == ParameterRole::index && infos[k].unit == "s") {
+      // The instant lies somewhere between the last sample before and the first one after.
+      for (std::size_t v = 1; v < log.visits.size(); ++v) {
+        if (log.visits[v].t_arrival_s != active.p[k]) continue;
+        const Visit& before = log.visits[v - 1];
+        const double end_s =
+            before.t_arrival_s + before.step_s * (static_cast<double>(before.count) - 1);
+        parameter.value = 0.5 * (end_s + active.p[k]);
+        parameter.u = (active.p[k] - end_s) / std::sqrt(12.0);
+      }
+    }
+    reported.push_back(std::move(parameter));
+  }
+  return reported;
+}
+
+void merge_names(std::vector<std::string>& into, const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    if (std::find(into.begin(), into.end(), name) == into.end()) into.push_back(name);
+  }
+}
+
+std::string number(double value, const char* format) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string describe(const FoundEffect& effect) {
+  std::string text = effect.id + " (";
+  for (std::size_t axis : effect.axes)
+    text += std::string(axis == effect.axes.front() ? "" : ", ") + kAxisName[axis];
+  text += "): ";
+  for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+    const EffectParameter& p = effect.parameters[k];
+    text += (k == 0 ? "" : ", ") + p.name + " = " + number(p.value, "%.4g");
+    if (p.u > 0) text += " ± " + number(p.u, "%.2g");
+    if (!p.unit.empty()) text += " " + p.unit;
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<FoundEffect> report_effects(const VisitLog& log, const EnlargedFit& fit) {
+  std::vector<FoundEffect> found;
+  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
+    const ActiveEffect& active = fit.parameters.effects[e];
+    const std::string id = active.effect->id();
+    auto entry = found.end();
+    // The same weakness of several axes is one effect with several axes.
+    if (active.effect->subject() == Subject::sensor) {
+      entry = std::find_if(found.begin(), found.end(),
+                           [&](const FoundEffect& f) { return f.id == id; });
+    }
+    if (entry == found.end()) {
+      FoundEffect fresh;
+      fresh.id = id;
+      fresh.p_value = 0;
+      entry = found.insert(found.end(), std::move(fresh));
+    }
+    for (std::size_t axis : axes_of(active)) {
+      if (std::find(entry->axes.begin(), entry->axes.end(), axis) == entry->axes.end()) {
+        entry->axes.push_back(axis);
+      }
+    }
+    std::sort(entry->axes.begin(), entry->axes.end());
+    for (EffectParameter& p : report_parameters(log, fit, e))
+      entry->parameters.push_back(std::move(p));
+  }
+  return found;
+}
+
+Diagnosed diagnose(const SearchInput& input, const SearchOptions& options) {
+  Diagnosed diagnosed;
+  diagnosed.candidates = all_candidates(input.log);
+  diagnosed.search = search_effects(input, diagnosed.candidates, options);
+  const SearchResult& search = diagnosed.search;
+  Diagnosis& diagnosis = diagnosed.diagnosis;
+
+  std::vector<FoundEffect> found = report_effects(input.log, search.fit);
+  for (std::size_t e = 0; e < search.evidence.size(); ++e) {
+    const Effect& effect = *search.evidence[e].candidate.effect;
+    const std::string id = effect.id();
+    if (const auto* term = dynamic_cast<const SmoothTerm*>(&effect)) {
+      diagnosis.unlisted.push_back({term->driver(), to_string(term->form()),
+                                    axes_of(search.fit.parameters.effects[e]), term->shape(),
+                                    search.evidence[e].p_value, 0});
+      continue;
+    }
+    for (FoundEffect& entry : found) {
+      if (entry.id != id) continue;
+      entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
+      merge_names(entry.alternatives, find_alternatives(input, diagnosed.candidates, search, e));
+    }
+  }
+  std::erase_if(found, [](const FoundEffect& f) { return f.id.starts_with("unlisted:"); });
+  diagnosis.effects = std::move(found);
+
+  if (diagnosis.effects.empty() && diagnosis.unlisted.empty()) {
+    diagnosis.verdict = Verdict::clean;
+    diagnosis.reason = "No effect stands out of the identified noise.";
+  } else {
+    diagnosis.verdict = diagnosis.effects.empty() ? Verdict::partly_explained : Verdict::explained;
+    for (const FoundEffect& effect : diagnosis.effects) {
+      diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ") + describe(effect);
+    }
+    for (const UnlistedStructure& u : diagnosis.unlisted) {
+      diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ");
+      diagnosis.reason += "a " + u.shape + " in " + u.driver + " changes the " + u.form;
+    }
+    diagnosis.reason += ".";
+  }
+  diagnosis.p_value =
+      search.evidence.empty() ? search.p_best_rest : search.evidence.front().p_value;
+  return diagnosed;
+}
+
+}  // namespace plumbline
