@@ -60,7 +60,8 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
       static_cast<double>(result.fit.parameters.free_count() - base.free_count());
 
   const auto usable = [&](const Candidate& candidate) {
-    if (same_effect(candidate, found)) return false;
+    // A smooth term can imitate anything; it is no rival that could be looked for.
+    if (candidate.handicap > 0 || same_effect(candidate, found)) return false;
     return std::none_of(result.evidence.begin(), result.evidence.end(),
                         [&](const Evidence& e) { return same_effect(e.candidate, candidate); });
   };

@@ -137,15 +137,17 @@ SearchResult search_effects(const SearchInput& input, const CandidateList& list,
   Stage stage = settle(input, input.start, nullptr);
   std::vector<Candidate> chosen;
   std::vector<double> p_values;
+  double looks = 1;
 
   while (true) {
     const CandidateDirections directions(input.log, list, stage.whitening, stage.fit);
     const Eigen::VectorXd gains = directions.gains(stage.fit.whitened_residual).col(0);
     std::vector<Scored> ranked = screen(list, directions, gains);
     if (ranked.empty()) break;
-    const double looks = effective_looks(directions, list.candidates.size(),
-                                         stage.fit.whitened_residual.size(), options);
     if (chosen.empty()) {
+      // The number of looks hardly changes while the model grows.
+      looks = effective_looks(directions, list.candidates.size(),
+                              stage.fit.whitened_residual.size(), options);
       for (const Scored& s : ranked) {
         result.ranking.push_back({list.candidates[s.candidate], s.score / std::log(10.0)});
       }

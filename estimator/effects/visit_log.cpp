@@ -50,7 +50,6 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
   log.gamma = description.gravity.local_mps2 / kStandardGravity_mps2;
   log.adc = description.adc;
   log.has_temperature = !samples.temp_C.empty();
-  std::vector<double> covariate_mean;
   for (const Covariate& covariate : samples.covariates) {
     log.covariate_names.push_back(covariate.name);
   }
@@ -78,6 +77,13 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
       visit.covariate.push_back(mean_of(covariate.value, pose));
     }
     log.visits.push_back(std::move(visit));
+  }
+  // Before the first turn the head came from its home position, like for that turn.
+  const auto turned = std::find_if(log.visits.begin(), log.visits.end(),
+                                   [](const Visit& v) { return v.delta_direction != 0; });
+  if (turned != log.visits.end()) {
+    std::for_each(log.visits.begin(), turned,
+                  [&](Visit& v) { v.delta_direction = turned->delta_direction; });
   }
   for (std::size_t c = 0; c < log.covariate_names.size(); ++c) {
     double mean = 0;
