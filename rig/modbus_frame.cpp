@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cassert>
 
 namespace plumbline::rig {
@@ -87,9 +89,10 @@ tl::expected<void, ReplyFault> parse_write_reply(std::span<const std::uint8_t> r
 
 std::vector<std::uint8_t> wrap_tcp(std::uint16_t transaction, std::span<const std::uint8_t> body) {
   const int length = static_cast<int>(body.size());
-  std::vector<std::uint8_t> frame = {high(transaction), low(transaction), 0, 0,
-                                     high(length),      low(length)};
-  frame.insert(frame.end(), body.begin(), body.end());
+  const std::array<std::uint8_t, kTcpPrefix> prefix = {high(transaction), low(transaction), 0, 0,
+                                                       high(length),      low(length)};
+  std::vector<std::uint8_t> frame(prefix.size() + body.size());
+  std::copy(body.begin(), body.end(), std::copy(prefix.begin(), prefix.end(), frame.begin()));
   return frame;
 }
 

@@ -62,8 +62,9 @@ Stage settle(const SearchInput& input, const EnlargedParameters& start, const St
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const Eigen::MatrixXd design =
           independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
-      stage.noise[i] = pool_noise(input.noise[i], input.windows, input.mean_V[i] - predicted[i],
-                                  design, input.extra_variance_V2[i]);
+      stage.noise[i] = NoisePool(input.noise[i], input.windows, input.mean_V[i] - predicted[i],
+                                 design, input.extra_variance_V2[i])
+                           .pooled();
       stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
     }
     stage.fit = fit_enlarged(input.log, input.mean_V, stage.whitening, stage.fit.parameters);
