@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "app/certificate/certificate.h"
@@ -39,6 +40,14 @@ std::string status_words(DecisionStatus status) {
       break;
   }
   return "NO LIMIT STATED";
+}
+
+/// A reason as it stands in a certificate: capital letter, full stop.
+std::string sentence(std::string text) {
+  if (text.empty()) return text;
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (text.back() != '.') text += '.';
+  return text;
 }
 
 void add_identification(Document& document, const CertificateInput& input) {
@@ -158,8 +167,8 @@ void add_errors(Document& document, const CertificateInput& input) {
 
   const Diagnosis& diagnosis = calibration.diagnosis;
   document.blocks.push_back(
-      Paragraph{fmt::format("Residual: {}. {} (p = {})", to_string(diagnosis.verdict),
-                            diagnosis.reason, significant(diagnosis.p_value, 2)),
+      Paragraph{fmt::format("Residual {}. {} p = {} for noise alone.", to_string(diagnosis.verdict),
+                            sentence(diagnosis.reason), significant(diagnosis.p_value, 2)),
                 diagnosis.verdict == Verdict::unexplained ? Tone::warning : Tone::plain});
 }
 
@@ -280,8 +289,8 @@ Document make_certificate(const CertificateInput& input) {
   const Calibration& calibration = input.calibration;
   Document document;
   document.title = "Calibration certificate";
-  document.subtitle = fmt::format("Accelerometer triad {}, serial number {}",
-                                  input.description.dut.model, input.description.dut.serial);
+  document.subtitle =
+      fmt::format("Accelerometer triad, serial number {}", input.description.dut.serial);
   document.id = certificate_id(input.provenance);
 
   const Diagnosis& diagnosis = calibration.diagnosis;
@@ -293,7 +302,7 @@ Document make_certificate(const CertificateInput& input) {
   document.headline = calibration.decision.status == DecisionStatus::none
                           ? (suspicious ? "Calibrated, residual too large" : "Calibrated")
                           : status_words(calibration.decision.status);
-  document.summary.push_back(diagnosis.reason);
+  document.summary.push_back(sentence(diagnosis.reason));
   const auto worst = [](const PerAxis<double>& v) { return *std::max_element(v.begin(), v.end()); };
   if (input.verification != nullptr) {
     document.summary.push_back(fmt::format(

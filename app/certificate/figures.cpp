@@ -241,7 +241,7 @@ Figure convergence_figure(const Calibration& calibration) {
       "least-squares value; the grey band is the final standard uncertainty times two.";
   figure.description = "Convergence of recursive least squares, filter and batch least squares";
   figure.width = kWidth;
-  constexpr double kPanelWidth = 128, kPanelHeight = 92, kStepX = 166, kStepY = 136, kTop = 50;
+  constexpr double kPanelWidth = 112, kPanelHeight = 92, kStepX = 164, kStepY = 136, kTop = 50;
   figure.height = kTop + 3 * kStepY - 4;
   figure.draw = [calibration](Canvas& canvas) {
     const Convergence& run = calibration.convergence;
@@ -276,7 +276,8 @@ Figure convergence_figure(const Calibration& calibration) {
         PlotAxis y{j == 0 ? "difference, mV/g" : j == 3 ? "difference, mV" : "", -half, half};
         y.ticks = 4;
         Plot plot(canvas,
-                  {56 + static_cast<double>(j) * kStepX, kTop + static_cast<double>(i) * kStepY},
+                  {62 + (j == 3 ? 24 : 0) + static_cast<double>(j) * kStepX,
+                   kTop + static_cast<double>(i) * kStepY},
                   kPanelWidth, kPanelHeight, x, y);
         plot.draw_frame(
             j == 3 ? fmt::format("U_{}0", kAxisName[i])
@@ -339,12 +340,14 @@ Figure residual_course(const Calibration& calibration) {
       PlotAxis y{i == 1 ? "residual, m/s²" : "", -scale, scale};
       y.ticks = 4;
       PlotAxis x{i == 2 ? "time, min" : "", t_low, t_high};
+      x.tick_labels = i == 2;
       Plot course(canvas, {60, top}, width, kPanelHeight, x, y);
       course.draw_frame(fmt::format("{} axis", kAxisName[i]));
       course.points(time_min, residual, 1.6, kAxisColor[i]);
       if (!with_temperature) continue;
       const auto [c_low, c_high] = range(temp_C);
       PlotAxis temperature{i == 2 ? "temperature, °C" : "", c_low, c_high};
+      temperature.tick_labels = i == 2;
       y.label.clear();
       y.tick_labels = false;
       Plot other(canvas, {60 + width + 24, top}, kWidth - 60 - width - 24 - 16, kPanelHeight,
