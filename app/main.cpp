@@ -79,8 +79,8 @@ int run(int argc, char** argv) {
     // A reader that has seen enough (`| head`) is no failure; a full disk is one.
     errno = 0;
     if (!std::cout.flush() && errno != EPIPE) {
-      complain(fmt::format("standard output: cannot write: {}",
-                           std::generic_category().message(errno)));
+      complain(
+          fmt::format("standard output: cannot write: {}", std::generic_category().message(errno)));
       return code(ExitCode::wrong_use);
     }
     return code(*outcome);

@@ -34,7 +34,7 @@ class OutputFolder {
   void discard() noexcept;
 
   std::filesystem::path folder_;
-  std::filesystem::path staging_;                ///< empty once published or moved from
+  std::filesystem::path staging_;               ///< empty once published or moved from
   std::vector<std::filesystem::path> created_;  ///< folders made by prepare(), innermost last
 };
 

@@ -39,9 +39,12 @@ Json to_json(const ModelEstimates& estimates) {
 }
 
 Json to_json(const NoiseModel& noise) {
-  return {{"source", noise.source},         {"rate_hz", json_number(noise.rate_hz)},
-          {"chi2", json_number(noise.chi2)}, {"dof", json_number(noise.dof)},
-          {"p_value", json_number(noise.p_value)}, {"adequate", noise.adequate}};
+  return {{"source", noise.source},
+          {"rate_hz", json_number(noise.rate_hz)},
+          {"chi2", json_number(noise.chi2)},
+          {"dof", json_number(noise.dof)},
+          {"p_value", json_number(noise.p_value)},
+          {"adequate", noise.adequate}};
 }
 
 Json to_json(const FoundEffect& effect) {
@@ -115,30 +118,29 @@ Json to_json(const Decision& decision) {
 
 Json result_json(const Calibration& calibration, const Provenance& provenance) {
   assert(calibration.observability.rank == 4);
-  return {
-      {"schema", "plumbline.result/1"},
-      {"provenance", json_provenance(provenance)},
-      {"data",
-       {{"poses", calibration.poses},
-        {"samples", calibration.samples},
-        {"skipped_rows", calibration.skipped_rows},
-        {"axes", json_axis_names({0, 1, 2})},
-        {"condition", json_number(calibration.observability.condition)}}},
-      {"noise", json_per_axis([&](std::size_t axis) {
-         return json_noise_terms(calibration.noise[axis], "V");
-       })},
-      {"noise_fit",
-       json_per_axis([&](std::size_t axis) { return to_json(calibration.noise[axis]); })},
-      {"estimates", to_json(calibration.estimates)},
-      {"diagnosis", to_json(calibration.diagnosis)},
-      {"final", to_json(calibration.final)},
-      {"error",
-       {{"before", to_json(calibration.before)},
-        {"after", to_json(calibration.after)},
-        {"floor",
-         {{"pose_rms", json_array(calibration.floor_pose_rms_mps2)},
-          {"u_pose_rms", json_array(calibration.u_floor_pose_rms_mps2)}}}}},
-      {"decision", to_json(calibration.decision)}};
+  return {{"schema", "plumbline.result/1"},
+          {"provenance", json_provenance(provenance)},
+          {"data",
+           {{"poses", calibration.poses},
+            {"samples", calibration.samples},
+            {"skipped_rows", calibration.skipped_rows},
+            {"axes", json_axis_names({0, 1, 2})},
+            {"condition", json_number(calibration.observability.condition)}}},
+          {"noise", json_per_axis([&](std::size_t axis) {
+             return json_noise_terms(calibration.noise[axis], "V");
+           })},
+          {"noise_fit",
+           json_per_axis([&](std::size_t axis) { return to_json(calibration.noise[axis]); })},
+          {"estimates", to_json(calibration.estimates)},
+          {"diagnosis", to_json(calibration.diagnosis)},
+          {"final", to_json(calibration.final)},
+          {"error",
+           {{"before", to_json(calibration.before)},
+            {"after", to_json(calibration.after)},
+            {"floor",
+             {{"pose_rms", json_array(calibration.floor_pose_rms_mps2)},
+              {"u_pose_rms", json_array(calibration.u_floor_pose_rms_mps2)}}}}},
+          {"decision", to_json(calibration.decision)}};
 }
 
 }  // namespace plumbline::app

@@ -19,8 +19,8 @@ struct Visit {
   double step_s = 0;       ///< between samples
   std::size_t count = 0;   ///< samples
   double t_mean_s = 0;
-  double temperature_K = 0;       ///< mean of T − T₀; 0 when not recorded
-  int delta_direction = 0;        ///< sign of the last turn of δ that led here; 0 if δ never turned
+  double temperature_K = 0;  ///< mean of T − T₀; 0 when not recorded
+  int delta_direction = 0;   ///< sign of the last turn of δ that led here; 0 if δ never turned
   std::vector<double> covariate;  ///< mean over the dwell, less the mean over the run
 };
 

@@ -40,8 +40,8 @@ inline MeasurementSet read_set(const std::filesystem::path& path) {
   const std::vector<double>& pose = columns["pose"];
   for (std::size_t i = 0; i < pose.size(); ++i) {
     if (i == 0 || pose[i] != pose[i - 1])
-      set.poses.push_back({static_cast<long long>(pose[i]), columns["delta_deg"][i],
-                           columns["h_deg"][i], i, 0});
+      set.poses.push_back(
+          {static_cast<long long>(pose[i]), columns["delta_deg"][i], columns["h_deg"][i], i, 0});
     ++set.poses.back().count;
   }
   return set;

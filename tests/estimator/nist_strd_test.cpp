@@ -103,8 +103,8 @@ class NistStrd : public testing::TestWithParam<Case> {};
 
 TEST_P(NistStrd, AgreesWithTheCertifiedValues) {
   const Case& c = GetParam();
-  const auto path =
-      std::filesystem::path(PLUMBLINE_SHARED_DIR) / "data/nist_strd" / (std::string(c.name) + ".dat");
+  const auto path = std::filesystem::path(PLUMBLINE_SHARED_DIR) / "data/nist_strd" /
+                    (std::string(c.name) + ".dat");
   if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is not here";
   const Dataset data = read(path);
   ASSERT_EQ(std::ssize(data.certified), c.parameters);
@@ -120,7 +120,8 @@ TEST_P(NistStrd, AgreesWithTheCertifiedValues) {
   for (Eigen::Index j = 0; j < c.parameters; ++j) {
     const auto k = static_cast<std::size_t>(j);
     worst = std::min(worst, digits_agreed(fit.x(j), data.certified[k]));
-    worst_u = std::min(worst_u, digits_agreed(s * std::sqrt(fit.cofactor(j, j)), data.certified_u[k]));
+    worst_u =
+        std::min(worst_u, digits_agreed(s * std::sqrt(fit.cofactor(j, j)), data.certified_u[k]));
   }
   RecordProperty("digits", std::to_string(worst));
   std::cout << c.name << ": " << worst << " digits, uncertainties " << worst_u << "\n";
@@ -134,20 +135,19 @@ TEST_P(NistStrd, AgreesWithTheCertifiedValues) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, NistStrd,
-    testing::Values(Case{"Norris", Model::straight_line, 2, 12},
-                    Case{"Pontius", Model::quadratic, 3, 12},
-                    Case{"NoInt1", Model::through_origin, 1, 14},
-                    Case{"NoInt2", Model::through_origin, 1, 14},
-                    Case{"Longley", Model::multiple, 7, 10.5},
-                    Case{"Filip", Model::polynomial, 11, 7},
-                    Case{"Wampler1", Model::polynomial, 6, 9},
-                    Case{"Wampler2", Model::polynomial, 6, 12},
-                    Case{"Wampler3", Model::polynomial, 6, 9},
-                    Case{"Wampler4", Model::polynomial, 6, 7.5},
-                    Case{"Wampler5", Model::polynomial, 6, 5.5}),
-    [](const auto& parameter) { return std::string(parameter.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, NistStrd,
+                         testing::Values(Case{"Norris", Model::straight_line, 2, 12},
+                                         Case{"Pontius", Model::quadratic, 3, 12},
+                                         Case{"NoInt1", Model::through_origin, 1, 14},
+                                         Case{"NoInt2", Model::through_origin, 1, 14},
+                                         Case{"Longley", Model::multiple, 7, 10.5},
+                                         Case{"Filip", Model::polynomial, 11, 7},
+                                         Case{"Wampler1", Model::polynomial, 6, 9},
+                                         Case{"Wampler2", Model::polynomial, 6, 12},
+                                         Case{"Wampler3", Model::polynomial, 6, 9},
+                                         Case{"Wampler4", Model::polynomial, 6, 7.5},
+                                         Case{"Wampler5", Model::polynomial, 6, 5.5}),
+                         [](const auto& parameter) { return std::string(parameter.param.name); });
 
 }  // namespace
 }  // namespace plumbline

@@ -92,7 +92,6 @@ TEST(Allan, Nbs14PublishedValues) {
   EXPECT_EQ(compared, 37);
 }
 
-
 /// Values and number of every row; limits with the noise type that the row states.
 void compare_table(const std::vector<double>& phase, const std::filesystem::path& path,
                    Deviation kind, bool limits, std::size_t exact_below) {
