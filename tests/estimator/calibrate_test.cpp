@@ -1,0 +1,173 @@
+#include "estimator/calibrate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/estimator/synthetic_run.h"
+
+namespace plumbline {
+namespace {
+
+using testing::HasSubstr;
+
+const Adc kSixteenBits{16, -5.0, 0.0};
+const Adc kTwelveBits{12, -5.0, 0.0};
+
+Calibration calibrated(const SyntheticRun& data) {
+  return calibrate({data.run, &data.still, data.description}, {});
+}
+
+TEST(Calibrate, FindsTheUnitAndItsNoise) {
+  const SyntheticRun data = synthetic_run(1, kSixteenBits);
+  const Calibration result = calibrated(data);
+
+  EXPECT_EQ(result.poses, 60u);
+  EXPECT_EQ(result.samples, 1200u);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const AxisEstimate& batch = result.estimates.batch_ls[axis];
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      const double u = std::sqrt(batch.covariance(j, j));
+      EXPECT_NEAR(batch.value(j), data.truth[axis][static_cast<std::size_t>(j)], 4 * u);
+      // 60 poses of σ/√20 and a design of condition near 4.
+      EXPECT_GT(u, 3e-4 / std::sqrt(20.0 * 60));
+      EXPECT_LT(u, 6 * 3e-4 / std::sqrt(20.0 * 60));
+    }
+    EXPECT_LT((result.estimates.rls->at(axis).value - batch.value).norm(), 1e-10);
+    EXPECT_LT(result.estimates.agreement_en[axis], 0.2);
+    const double expected_mps2 = 3e-4 / std::sqrt(20.0) * std::sqrt(56.0 / 60) / 0.032 * 9.80665;
+    EXPECT_NEAR(result.floor_pose_rms_mps2[axis], expected_mps2, 0.15 * expected_mps2);
+    EXPECT_NEAR(result.before.fit_pose_rms_mps2[axis], expected_mps2, 0.35 * expected_mps2);
+    EXPECT_GT(result.before.heldout_pose_rms_mps2[axis], result.before.fit_pose_rms_mps2[axis]);
+    EXPECT_GT(result.before.heldout_pose_max_abs_mps2[axis],
+              result.before.heldout_pose_rms_mps2[axis]);
+    EXPECT_EQ(result.after.fit_pose_rms_mps2[axis], result.before.fit_pose_rms_mps2[axis]);
+  }
+  EXPECT_EQ(result.decision.status, DecisionStatus::none);
+}
+
+TEST(Calibrate, FollowsTheEstimateFromPoseToPose) {
+  const SyntheticRun data = synthetic_run(2, kSixteenBits);
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.convergence.rls.size(), 60u);
+  ASSERT_EQ(result.convergence.ekf.size(), 60u);
+  ASSERT_EQ(result.convergence.batch_ls.size(), 60u);
+  // The first ring, h = 0, says nothing about K_z: the batch fit has no estimate, the others keep
+  // their wide priors.
+  EXPECT_TRUE(std::isnan(result.convergence.batch_ls[10][0].value(0)));
+  EXPECT_GT(result.convergence.rls[10][0].covariance(2, 2), 1e5);
+  EXPECT_NEAR(result.convergence.ekf[10][0].covariance(2, 2), 1.0, 1e-3);
+  for (const std::size_t pose : {20u, 40u, 59u})
+    EXPECT_LT(
+        (result.convergence.rls[pose][1].value - result.convergence.batch_ls[pose][1].value).norm(),
+        1e-10);
+}
+
+TEST(Calibrate, SaysWhenTheModelLacksSomething) {
+  SyntheticOptions options;
+  options.k2_x_V_per_g2 = 0.032 * 0.05;
+  const Calibration result = calibrated(synthetic_run(3, kSixteenBits, options));
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::unexplained);
+  EXPECT_THAT(result.diagnosis.reason, HasSubstr("x axis: residual"));
+  EXPECT_LT(result.diagnosis.p_value, 1e-6);
+  EXPECT_THAT(result.diagnosis.effects, testing::IsEmpty());
+}
+
+TEST(Calibrate, NoiseFromTheBurstsWhenThereIsNoStaticRecord) {
+  const SyntheticRun data = synthetic_run(4, kSixteenBits);
+  const Calibration result = calibrate({data.run, nullptr, data.description}, {});
+  EXPECT_EQ(result.noise[0].source, "bursts at the poses");
+  EXPECT_NEAR(result.noise[0].N.value, 3e-4 / 10, 0.1 * 3e-4 / 10);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
+}
+
+TEST(Calibrate, NamesWhatThePosesDoNotDetermine) {
+  SyntheticOptions options;
+  options.h_step_deg = 100;  // one ring
+  const Calibration result = calibrated(synthetic_run(5, kSixteenBits, options));
+  EXPECT_EQ(result.observability.rank, 3);
+  EXPECT_THAT(result.observability.unobservable, HasSubstr("K_z"));
+  EXPECT_TRUE(result.pose_results.empty());
+}
+
+TEST(Calibrate, FewPosesCannotBeJudged) {
+  SyntheticOptions options;
+  options.delta_step_deg = 120;
+  options.h_step_deg = 40;
+  const Calibration result = calibrated(synthetic_run(6, kSixteenBits, options));
+  EXPECT_EQ(result.poses, 9u);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::undetermined);
+  EXPECT_THAT(result.diagnosis.reason, HasSubstr("9 poses"));
+}
+
+TEST(Calibrate, DecidesAgainstTheLimit) {
+  SyntheticRun data = synthetic_run(7, kSixteenBits);
+  data.description.limits = Limits{10.0};
+  EXPECT_EQ(calibrated(data).decision.status, DecisionStatus::pass);
+  data.description.limits = Limits{1e-4};
+  EXPECT_EQ(calibrated(data).decision.status, DecisionStatus::fail);
+}
+
+TEST(Calibrate, UncertainGravityScalesAllOfK) {
+  SyntheticRun data = synthetic_run(8, kSixteenBits);
+  data.description.gravity.u_mps2 = 0.0981;  // one per cent
+  const AxisEstimate& estimate = calibrated(data).estimates.batch_ls[0];
+  EXPECT_NEAR(std::sqrt(estimate.covariance(0, 0)), 0.01 * estimate.value(0),
+              1e-3 * estimate.value(0));
+  const double correlation =
+      estimate.covariance(0, 1) / std::sqrt(estimate.covariance(0, 0) * estimate.covariance(1, 1));
+  EXPECT_LT(correlation, -0.5);  // K_xx > 0, K_xy < 0
+}
+
+// The step of 12 bits is 1.22 mV; without noise each pose keeps its own rounding offset.
+TEST(Calibrate, RoundingWithoutNoiseIsNotAveragedAway) {
+  SyntheticOptions options;
+  options.sigma_V = 1e-6;
+  const SyntheticRun data = synthetic_run(9, kTwelveBits, options);
+  const Calibration result = calibrated(data);
+  const double expected_mps2 = kTwelveBits.lsb_V() / std::sqrt(12.0) / 0.032 * 9.80665;
+  EXPECT_NEAR(result.before.fit_pose_rms_mps2[0], expected_mps2, 0.3 * expected_mps2);
+  EXPECT_NEAR(std::sqrt(result.estimates.batch_ls[0].covariance(3, 3)),
+              1.7 * kTwelveBits.lsb_V() / std::sqrt(12.0 * 60),
+              0.5 * kTwelveBits.lsb_V() / std::sqrt(12.0 * 60));
+}
+
+TEST(Calibrate, IsDeterministic) {
+  const SyntheticRun data = synthetic_run(10, kSixteenBits);
+  const Calibration first = calibrated(data);
+  const Calibration second = calibrated(data);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    EXPECT_EQ(first.estimates.batch_ls[axis].value, second.estimates.batch_ls[axis].value);
+    EXPECT_EQ(first.estimates.ekf[axis].covariance, second.estimates.ekf[axis].covariance);
+  }
+  EXPECT_EQ(first.diagnosis.p_value, second.diagnosis.p_value);
+}
+
+// 60 units: 720 parameters, 95 % of them within 2 u give 684 ± 5.8; four standard deviations.
+void expect_coverage(const Adc& adc, double sigma_V) {
+  SyntheticOptions options;
+  options.sigma_V = sigma_V;
+  options.samples_per_pose = 10;
+  int inside = 0;
+  for (std::uint64_t seed = 100; seed < 160; ++seed) {
+    const SyntheticRun data = synthetic_run(seed, adc, options);
+    const Calibration result = calibrated(data);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const AxisEstimate& batch = result.estimates.batch_ls[axis];
+      for (Eigen::Index j = 0; j < 4; ++j)
+        inside += std::abs(batch.value(j) - data.truth[axis][static_cast<std::size_t>(j)]) <=
+                  1.96 * std::sqrt(batch.covariance(j, j));
+    }
+  }
+  EXPECT_NEAR(inside, 684, 24);
+}
+
+TEST(Coverage, SixteenBits) { expect_coverage(kSixteenBits, 3e-4); }
+TEST(Coverage, TwelveBitsWithNoiseOfHalfAStep) {
+  expect_coverage(kTwelveBits, 0.5 * kTwelveBits.lsb_V());
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,72 @@
+// Runs made up for tests: ideal head, white noise, ADC, everything known.
+#pragma once
+
+#include <cmath>
+#include <random>
+
+#include "estimator/measurement.h"
+
+namespace plumbline {
+
+struct SyntheticOptions {
+  double sigma_V = 3e-4;  ///< of one sample
+  std::size_t samples_per_pose = 20;
+  int delta_step_deg = 30;
+  int h_step_deg = 20;
+  double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
+};
+
+struct SyntheticRun {
+  PerAxis<std::array<double, 4>> truth;  ///< [K_ix K_iy K_iz U_i0]
+  RunDescription description;
+  MeasurementSet run;
+  SampleTable still;  ///< 60 s at δ = h = 0
+};
+
+inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
+                                  const SyntheticOptions& options = {}) {
+  constexpr double kRate_hz = 100;
+  constexpr double kRadians = 3.14159265358979323846 / 180;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  SyntheticRun result;
+  result.truth = {{{0.032002, -0.0017435, 7.4811e-5, -2.5865},
+                   {0.0022174, 0.031399, 0.00016485, -2.4363},
+                   {-0.00033471, -0.0017407, -0.032812, -2.3423}}};
+  for (auto& row : result.truth)
+    for (std::size_t j = 0; j < 4; ++j) row[j] += (j < 3 ? 3e-4 : 0.03) * normal(random);
+  result.description.gravity = {9.8101, 0.00002};
+  result.description.adc = adc;
+  const double gamma = 9.8101 / kStandardGravity_mps2;
+
+  const auto add_sample = [&](SampleTable& table, double t_s, double delta_deg, double h_deg) {
+    const double c = std::cos(h_deg * kRadians);
+    const std::array<double, 3> a = {gamma * c * std::cos(delta_deg * kRadians),
+                                     -gamma * c * std::sin(delta_deg * kRadians),
+                                     gamma * std::sin(h_deg * kRadians)};
+    table.t_s.push_back(t_s);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const auto& row = result.truth[axis];
+      double u_V = row[0] * a[0] + row[1] * a[1] + row[2] * a[2] + row[3];
+      if (axis == 0) u_V += options.k2_x_V_per_g2 * a[0] * a[0];
+      u_V += options.sigma_V * normal(random);
+      table.u_V[axis].push_back(adc.min_V +
+                                adc.lsb_V() * std::round((u_V - adc.min_V) / adc.lsb_V()));
+    }
+  };
+  for (int i = 0; i < 6000; ++i) add_sample(result.still, i / kRate_hz, 0, 0);
+  double t_s = 61;
+  for (int h = 0; h <= 80; h += options.h_step_deg) {
+    for (int delta = 0; delta < 360; delta += options.delta_step_deg) {
+      result.run.poses.push_back({std::ssize(result.run.poses), static_cast<double>(delta),
+                                  static_cast<double>(h), result.run.samples.size(),
+                                  options.samples_per_pose});
+      for (std::size_t i = 0; i < options.samples_per_pose; ++i)
+        add_sample(result.run.samples, t_s + static_cast<double>(i) / kRate_hz, delta, h);
+      t_s += 3;
+    }
+  }
+  return result;
+}
+
+}  // namespace plumbline
