@@ -29,14 +29,16 @@ struct Experiment {
   const CalibrationInput& input;
   std::vector<PoseMean> poses;
   std::vector<SampleWindow> windows;
-  std::array<Eigen::MatrixXd, kTermCount> unit_covariance;  ///< of the pose means, per noise term
-  Eigen::MatrixXd A;                                        ///< n × 4
-  Eigen::MatrixXd drivers;                                  ///< n × k, temperature and covariates
+  Eigen::MatrixXd A;        ///< n × 4
+  Eigen::MatrixXd drivers;  ///< n × k, temperature and covariates
 };
+
+using TermCovariances = std::array<Eigen::MatrixXd, kTermCount>;
 
 /// One axis on its way through the engine.
 struct AxisWork {
   NoiseModel noise;        ///< with the powers that the run, too, supports
+  TermCovariances unit;    ///< of the pose means, per noise term of coefficient 1
   Eigen::VectorXd y;       ///< pose means, V
   Eigen::VectorXd own_V2;  ///< variance that each pose has for itself: positioning and rounding
   GeneralisedFit fit;
@@ -79,12 +81,12 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
 }
 
 /// Covariance of the pose means, n × n.
-Eigen::MatrixXd pose_covariance_V2(const Experiment& experiment, const NoisePowers& powers,
+Eigen::MatrixXd pose_covariance_V2(const TermCovariances& unit, const NoisePowers& powers,
                                    const Eigen::VectorXd& own_V2) {
   Eigen::MatrixXd V = own_V2.asDiagonal();
   for (std::size_t term = 0; term < kTermCount; ++term) {
     const double power = powers(static_cast<Eigen::Index>(term));
-    if (power > 0) V += power * experiment.unit_covariance[term];
+    if (power > 0) V += power * unit[term];
   }
   return V;
 }
@@ -114,6 +116,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   const Eigen::VectorXd positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
   work.own_V2 = positioning_V2.array() + shared_rounding_variance(identified);
 
+  work.unit = unit_covariances(experiment.windows, identified.walk_decay_per_s);
+
   NoisePowers powers = noise_powers(identified);
   if (n > 4 && powers.sum() > 0) {
     const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
@@ -122,7 +126,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
     powers = work.test.noise.power;
   }
   work.noise = with_powers(identified, powers);
-  work.V = pose_covariance_V2(experiment, powers, work.own_V2);
+  work.V = pose_covariance_V2(work.unit, powers, work.own_V2);
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
     work.noise_known = powers.sum() > 0;
@@ -174,7 +178,7 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
   NoisePowers white = NoisePowers::Zero();
   white(kTermQ) = squared(work.noise.Q.value);
   white(kTermN) = squared(work.noise.N.value);
-  const Eigen::VectorXd white_V2 = pose_covariance_V2(experiment, white, work.own_V2).diagonal();
+  const Eigen::VectorXd white_V2 = pose_covariance_V2(work.unit, white, work.own_V2).diagonal();
 
   RecursiveLeastSquares recursive(kPriorSd);
   EightStateFilter filter(work.noise, filter_options(experiment),
@@ -201,7 +205,7 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
 void floor_of(const Experiment& experiment, const AxisWork& work, const NoiseModel& identified,
               double mps2_per_V, double& floor_mps2, double& u_floor_mps2) {
   const Eigen::MatrixXd V =
-      work.noise_known ? pose_covariance_V2(experiment, noise_powers(identified), work.own_V2)
+      work.noise_known ? pose_covariance_V2(work.unit, noise_powers(identified), work.own_V2)
                        : work.V;
   const double mean_square = expected_mean_square_V2(experiment.A, work.fit.gain, V);
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
@@ -212,8 +216,8 @@ void floor_of(const Experiment& experiment, const AxisWork& work, const NoiseMod
   for (std::size_t i = 0; i < kTermCount; ++i) {
     if (!terms[i]->present) continue;
     const double u_power = squared(terms[i]->value + terms[i]->u) - squared(terms[i]->value);
-    variance += squared(u_power * expected_mean_square_V2(experiment.A, work.fit.gain,
-                                                          experiment.unit_covariance[i]));
+    variance +=
+        squared(u_power * expected_mean_square_V2(experiment.A, work.fit.gain, work.unit[i]));
   }
   u_floor_mps2 = floor_mps2 > 0
                      ? std::abs(mps2_per_V) * std::sqrt(variance) / (2.0 * std::sqrt(mean_square))
@@ -241,7 +245,7 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
 
 Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /*options*/) {
   assert(input.run.has_angles && !input.run.poses.empty());
-  Experiment experiment{input, pose_means(input.run), {}, {}, {}, {}};
+  Experiment experiment{input, pose_means(input.run), {}, {}, {}};
   experiment.A = design_matrix(experiment.poses, input.description.gravity);
 
   Calibration result;
@@ -253,7 +257,6 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /
 
   experiment.windows = pose_windows(input.run.samples, input.run.poses);
   experiment.drivers = driver_means(input.run.samples, input.run.poses);
-  experiment.unit_covariance = unit_covariances(experiment.windows);
   const std::size_t n = experiment.poses.size();
   result.convergence.rls.resize(n);
   result.convergence.ekf.resize(n);

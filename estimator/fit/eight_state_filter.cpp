@@ -23,6 +23,7 @@ EightStateFilter::EightStateFilter(const NoiseModel& noise, const EightStateOpti
                                    double start_s)
     : flicker_rate_per_s_(1.0 / options.flicker_correlation_s),
       walk_density_(squared(coefficient(noise.K))),
+      walk_decay_per_s_(noise.walk_decay_per_s),
       ramp_frequency_(options.ramp_frequency_rad_s),
       parameter_density_(options.parameter_walk.cwiseAbs2()),
       t_s_(start_s) {
@@ -39,7 +40,10 @@ EightStateFilter::EightStateFilter(const NoiseModel& noise, const EightStateOpti
   P_.setZero();
   P_.diagonal().head<4>() = options.prior_sd.cwiseAbs2();
   P_(kStateFlicker, kStateFlicker) = flicker_variance;
-  // Random walk and ramp are counted from the start: their level is U0's.
+  // Random walk and ramp are counted from the start: their level is U0's. A walk that forgets has
+  // been going on for long.
+  if (walk_decay_per_s_ > 0)
+    P_(kStateRandomWalk, kStateRandomWalk) = walk_density_ / (2.0 * walk_decay_per_s_);
   P_(kStateRampRate, kStateRampRate) = squared(slope_V_per_s);
 }
 
@@ -54,7 +58,11 @@ EightStateFilter::Step EightStateFilter::discretise(double dt_s) const {
   step.F(kStateFlicker, kStateFlicker) = decay;
   step.Q(kStateFlicker, kStateFlicker) = -flicker_density_ / (2.0 * flicker_rate_per_s_) *
                                          std::expm1(-2.0 * flicker_rate_per_s_ * dt_s);
-  step.Q(kStateRandomWalk, kStateRandomWalk) = walk_density_ * dt_s;
+  step.F(kStateRandomWalk, kStateRandomWalk) = std::exp(-walk_decay_per_s_ * dt_s);
+  step.Q(kStateRandomWalk, kStateRandomWalk) =
+      walk_density_ * (walk_decay_per_s_ > 0 ? -std::expm1(-2.0 * walk_decay_per_s_ * dt_s) /
+                                                   (2.0 * walk_decay_per_s_)
+                                             : dt_s);
 
   // Van Loan (1978): exp([−A G; 0 Aᵀ]·dt) = [· A⁻G; 0 Φᵀ].
   Eigen::Matrix2d A;

@@ -80,7 +80,8 @@ class EightStateFilter {
   double flicker_rate_per_s_ = 0;
   double flicker_density_ = 0;  ///< driving density, V²/s
   double walk_density_ = 0;     ///< V²/s
-  double ramp_density_ = 0;     ///< V²/s³
+  double walk_decay_per_s_ = 0;
+  double ramp_density_ = 0;  ///< V²/s³
   double ramp_frequency_ = 0;
   Eigen::Vector4d parameter_density_;
   double t_s_ = 0;

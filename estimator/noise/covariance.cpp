@@ -31,6 +31,29 @@ double mean_log_distance(const SampleWindow& a, const SampleWindow& b) {
          (wa * wb);
 }
 
+/// Covariance of the window means of a Gauss-Markov process with unit driving density.
+Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double decay_per_s) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  const double variance = 0.5 / decay_per_s;
+  Eigen::VectorXd averaged(n);  // of exp(−decay·t) over the window
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double x = decay_per_s * duration_s(windows[static_cast<std::size_t>(i)]);
+    averaged(i) = x > 1e-6 ? -std::expm1(-x) / x : 1 - 0.5 * x;
+    covariance(i, i) = x > 1e-3 ? variance * 2 * (1 - averaged(i)) / x : variance * (1 - x / 3);
+  }
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const SampleWindow& a = windows[static_cast<std::size_t>(i)];
+    const double end_s = begin_s(a) + duration_s(a);
+    for (Eigen::Index j = i + 1; j < n; ++j) {
+      const double apart_s = std::max(begin_s(windows[static_cast<std::size_t>(j)]) - end_s, 0.0);
+      covariance(i, j) = variance * averaged(i) * averaged(j) * std::exp(-decay_per_s * apart_s);
+      covariance(j, i) = covariance(i, j);
+    }
+  }
+  return covariance;
+}
+
 }  // namespace
 
 std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses) {
@@ -57,7 +80,8 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
   return windows;
 }
 
-std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows) {
+std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows,
+                                                         double walk_decay_per_s) {
   const auto n = static_cast<Eigen::Index>(windows.size());
   std::array<Eigen::MatrixXd, kTermCount> unit;
   unit.fill(Eigen::MatrixXd::Zero(n, n));
@@ -99,11 +123,13 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
     }
   }
   unit[kTermR] = time * time.transpose();
+  if (walk_decay_per_s > 0) unit[kTermK] = bounded_walk(windows, walk_decay_per_s);
   return unit;
 }
 
 Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<SampleWindow>& windows) {
-  const std::array<Eigen::MatrixXd, kTermCount> unit = unit_covariances(windows);
+  const std::array<Eigen::MatrixXd, kTermCount> unit =
+      unit_covariances(windows, model.walk_decay_per_s);
   const NoisePowers power = noise_powers(model);
   const auto n = static_cast<Eigen::Index>(windows.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);

@@ -28,9 +28,11 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
 /// which is only felt in the constant that every model here has as a free parameter:
 /// - flicker: (1/π)·ln(τ_c/|τ|), averaged over both windows in closed form, with τ_c the span of
 ///   all windows. Positive definite, since τ_c exceeds the span's logarithmic capacity (span/4);
-/// - random walk: starts at zero one step before the first window;
+/// - random walk: starts at zero one step before the first window; with walk_decay_per_s > 0 it is
+///   a stationary first-order Gauss-Markov process, exp(−|τ|·decay)/(2·decay), averaged likewise;
 /// - ramp: time from the middle of the span.
-std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows);
+std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows,
+                                                         double walk_decay_per_s);
 
 /// Covariance of the window means under all identified terms, U², positive definite when white
 /// noise or rounding is present. Rounding coarser than the noise adds shared_rounding_variance() to

@@ -72,13 +72,20 @@ void fill_terms(const TermFit& fit, NoiseModel& model) {
         model.correlation(i, j) = covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j));
   if (model.R.u > 0) model.correlation(kTermR, kTermR) = 1;
   model.spectrum = fit.spectrum;
+  model.walk_decay_per_s = fit.walk_decay_per_s;
 }
 
 double fitted_deviation(const NoiseModel& model, double tau) {
   const auto square = [](double v) { return v * v; };
+  double walk = tau / 3;
+  if (model.walk_decay_per_s > 0) {  // Gauss-Markov: IEEE Std 952, annex C
+    const double x = model.walk_decay_per_s * tau;
+    walk = (1 - (3 - 4 * std::exp(-x) + std::exp(-2 * x)) / (2 * x)) /
+           (square(model.walk_decay_per_s) * tau);
+  }
   return std::sqrt(3 * square(model.Q.value / tau) + square(model.N.value) / tau +
                    square(model.B.value) * 2 * std::numbers::ln2 / std::numbers::pi +
-                   square(model.K.value) * tau / 3 + 0.5 * square(model.R.value * tau));
+                   square(model.K.value) * walk + 0.5 * square(model.R.value * tau));
 }
 
 }  // namespace

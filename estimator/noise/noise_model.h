@@ -56,6 +56,9 @@ struct NoiseModel {
   NoiseTerm K;  ///< acceleration random walk, U/√s: σ² = K²τ/3
   NoiseTerm R;  ///< ramp, U/s:                     σ² = R²τ²/2
   double rate_hz = 0;
+  /// Rate at which the random walk K forgets, 1/s: a first-order Gauss-Markov process with this
+  /// inverse correlation time and driving density K². 0: never, the walk of IEEE Std 952.
+  double walk_decay_per_s = 0;
   /// Step of the converter where it is coarser than the noise, U. Then the rounding of a resting
   /// reading does not average out; 0 when it is buried in the white noise, where N contains it.
   double rounding_step = 0;

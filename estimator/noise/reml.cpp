@@ -44,7 +44,7 @@ NoisePool::NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& w
                      const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                      const Eigen::VectorXd& extra_variance)
     : spectrum_(model.spectrum),
-      unit_(unit_covariances(windows)),
+      unit_(unit_covariances(windows, model.walk_decay_per_s)),
       mean_(mean),
       design_(design),
       start_(noise_powers(model)) {

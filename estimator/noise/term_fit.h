@@ -26,7 +26,8 @@ struct TermFit {
   /// Gain in 2·ln likelihood by having the term; for the ramp the squared slope over its variance.
   NoisePowers gain = NoisePowers::Zero();
   NoisePowers upper_power = NoisePowers::Zero();  ///< 95 % upper limits, of the squares
-  double chi2 = 0;  ///< of the smoothed spectrum about the fit, one value a bin
+  double walk_decay_per_s = 0;  ///< of K; not 0 where the record shows that its walk is bounded
+  double chi2 = 0;              ///< of the smoothed spectrum about the fit, one value a bin
   double dof = 0;
   bool line = false;          ///< a single frequency stands out
   double line_hz = 0;         ///< the strongest one
@@ -39,7 +40,9 @@ struct TermFit {
 /// two-sided, T = 1/rate, s = 2·sin(πfT):
 ///   Q: Q²s²/T,  N: N²,  B: B²T/s,  K: K²T²/s²,
 /// the densities of IEEE Std 952 with aliasing: differenced, fractionally and once summed white
-/// noise. The ramp is a straight line, estimated by generalised least squares in the same fit;
+/// noise. A walk that is seen to level off is replaced by a first-order Gauss-Markov process, whose
+/// correlation time is searched on a grid: carried on beyond the record it would grow without
+/// bound. The ramp is a straight line, estimated by generalised least squares in the same fit;
 /// the degree of freedom it takes is accounted for (restricted likelihood).
 TermFit fit_terms(const std::vector<double>& record, double rate_hz);
 
