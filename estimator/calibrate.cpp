@@ -1,5 +1,6 @@
 #include "estimator/calibrate.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
@@ -99,7 +100,8 @@ NoiseTerm term_of_power(double power) {
 }
 
 /// The filter has to believe in the same noise as the batch fit, or their comparison says nothing.
-NoiseModel with_powers(NoiseModel noise, const NoisePowers& powers) {
+NoiseModel with_powers(NoiseModel noise, const NoisePowers& powers, double walk_decay_per_s) {
+  noise.walk_decay_per_s = walk_decay_per_s;
   noise.Q = term_of_power(powers(kTermQ));
   noise.N = term_of_power(powers(kTermN));
   noise.B = term_of_power(powers(kTermB));
@@ -116,16 +118,17 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   const Eigen::VectorXd positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
   work.own_V2 = positioning_V2.array() + shared_rounding_variance(identified);
 
-  work.unit = unit_covariances(experiment.windows, identified.walk_decay_per_s);
-
   NoisePowers powers = noise_powers(identified);
+  double walk_decay_per_s = identified.walk_decay_per_s;
   if (n > 4 && powers.sum() > 0) {
     const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
     work.test = test_residual(identified, {work.y, experiment.A, a_g, experiment.windows,
                                            positioning_V2, experiment.drivers});
     powers = work.test.noise.power;
+    walk_decay_per_s = work.test.noise.walk_decay_per_s;
   }
-  work.noise = with_powers(identified, powers);
+  work.noise = with_powers(identified, powers, walk_decay_per_s);
+  work.unit = unit_covariances(experiment.windows, walk_decay_per_s);
   work.V = pose_covariance_V2(work.unit, powers, work.own_V2);
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
@@ -201,27 +204,30 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
   }
 }
 
-/// Expected pose RMS under the identified noise, and its uncertainty from that of the noise terms.
-void floor_of(const Experiment& experiment, const AxisWork& work, const NoiseModel& identified,
-              double mps2_per_V, double& floor_mps2, double& u_floor_mps2) {
-  const Eigen::MatrixXd V =
-      work.noise_known ? pose_covariance_V2(work.unit, noise_powers(identified), work.own_V2)
-                       : work.V;
-  const double mean_square = expected_mean_square_V2(experiment.A, work.fit.gain, V);
+/// Expected pose RMS under the noise, and its uncertainty from that of the noise powers.
+void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_per_V,
+              double& floor_mps2, double& u_floor_mps2) {
+  const double mean_square = expected_mean_square_V2(experiment.A, work.fit.gain, work.V);
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
+  u_floor_mps2 = 0;
 
-  const std::array<const NoiseTerm*, kTermCount> terms = {
-      &identified.Q, &identified.N, &identified.B, &identified.K, &identified.R};
-  double variance = 0;
-  for (std::size_t i = 0; i < kTermCount; ++i) {
-    if (!terms[i]->present) continue;
-    const double u_power = squared(terms[i]->value + terms[i]->u) - squared(terms[i]->value);
-    variance +=
-        squared(u_power * expected_mean_square_V2(experiment.A, work.fit.gain, work.unit[i]));
-  }
-  u_floor_mps2 = floor_mps2 > 0
-                     ? std::abs(mps2_per_V) * std::sqrt(variance) / (2.0 * std::sqrt(mean_square))
-                     : 0.0;
+  // Powers at zero are held there; the ramp is no variance.
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index term = 0; term < static_cast<Eigen::Index>(kTermR); ++term)
+    if (work.test.noise.power(term) > 0) free.push_back(term);
+  if (!work.noise_known || free.empty()) return;
+  Eigen::VectorXd slope(std::ssize(free));
+  for (Eigen::Index i = 0; i < slope.size(); ++i)
+    slope(i) = expected_mean_square_V2(
+        experiment.A, work.fit.gain,
+        work.unit[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])]);
+  const Eigen::MatrixXd information = work.test.noise.information(free, free);
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::VectorXd right = scale.cwiseProduct(slope);
+  const double variance = right.dot(scaled.ldlt().solve(right));
+  u_floor_mps2 =
+      std::abs(mps2_per_V) * std::sqrt(std::max(variance, 0.0)) / (2.0 * std::sqrt(mean_square));
 }
 
 /// Errors of one axis; returns the held-out errors of both partitions one after the other.
@@ -277,7 +283,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /
     result.diagnosis.axis_test[axis] = {w.test.chi2, w.test.dof, w.test.p_value};
 
     const Eigen::VectorXd heldout = error_figures(experiment, w, axis, mps2_per_V, result.before);
-    floor_of(experiment, w, result.noise[axis], mps2_per_V, result.floor_pose_rms_mps2[axis],
+    floor_of(experiment, w, mps2_per_V, result.floor_pose_rms_mps2[axis],
              result.u_floor_pose_rms_mps2[axis]);
     verdict.axis[axis] = {w.noise_known,
                           std::isfinite(mps2_per_V),

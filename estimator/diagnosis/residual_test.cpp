@@ -25,6 +25,19 @@ void append_position(const Eigen::MatrixXd& a, std::vector<Eigen::VectorXd>& col
                   .matrix());
 }
 
+/// A tilted base or a horizontal field turns with the sensor at full strength however high the
+/// spindle points: directions on the horizontal circle, no polynomials of the specific force.
+void append_horizontal(const Eigen::MatrixXd& a, std::vector<Eigen::VectorXd>& columns) {
+  const Eigen::ArrayXd level = a.leftCols<2>().rowwise().norm().array();
+  const Eigen::ArrayXd upright = (level > 1e-6).select(level.inverse(), 0.0);
+  for (Eigen::Index c = 0; c < 2; ++c) {
+    const Eigen::ArrayXd direction = a.col(c).array() * upright;
+    columns.emplace_back(direction.matrix());
+    columns.emplace_back((direction * a.col(2).array()).matrix());
+  }
+  columns.emplace_back(level.matrix());
+}
+
 /// What may remain of the way to a pose: the change of the specific force, its sign (hysteresis),
 /// and the sense of turning about z times the cross axes (backlash). Zero at the first pose.
 void append_history(const Eigen::MatrixXd& a, std::vector<Eigen::VectorXd>& columns) {
@@ -52,6 +65,7 @@ Eigen::MatrixXd structure_functions(const Eigen::MatrixXd& a, const Eigen::Matri
                                     const Eigen::MatrixXd& design) {
   std::vector<Eigen::VectorXd> columns;
   append_position(a, columns);
+  append_horizontal(a, columns);
   append_history(a, columns);
   append_scale_drift(a, columns);
   for (Eigen::Index c = 0; c < drivers.cols(); ++c) {
@@ -153,7 +167,8 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   const Eigen::Index n = y.size();
   const Eigen::MatrixXd functions =
       structure_functions(input.specific_force, input.drivers, input.design);
-  const NoisePool plain_pool(noise, input.windows, y, input.design, input.extra_variance);
+  const NoisePool plain_pool =
+      best_pool(noise, input.windows, y, input.design, input.extra_variance);
   const Judgement plain =
       judge(plain_pool, plain_pool.pooled(), y, input.design, functions, input.design.cols());
   ResidualTestResult result;
@@ -165,7 +180,7 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
     // beside the functions, too, slow noise is partly taken for structure. Both count.
     Eigen::MatrixXd full(n, input.design.cols() + functions.cols());
     full << input.design, functions;
-    const NoisePool rich_pool(noise, input.windows, y, full, input.extra_variance);
+    const NoisePool rich_pool = best_pool(noise, input.windows, y, full, input.extra_variance);
     const Judgement rich =
         judge(rich_pool, rich_pool.pooled(), y, input.design, functions, full.cols());
     result.p_structure = merged(plain.p_structure, rich.p_structure);

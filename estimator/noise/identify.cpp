@@ -73,6 +73,7 @@ void fill_terms(const TermFit& fit, NoiseModel& model) {
   if (model.R.u > 0) model.correlation(kTermR, kTermR) = 1;
   model.spectrum = fit.spectrum;
   model.walk_decay_per_s = fit.walk_decay_per_s;
+  model.descriptions = fit.descriptions;
 }
 
 double fitted_deviation(const NoiseModel& model, double tau) {

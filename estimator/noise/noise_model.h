@@ -48,6 +48,14 @@ struct SpectrumBin {
   Eigen::Vector4d density = Eigen::Vector4d::Zero();
 };
 
+/// A record's spectrum described by a walk that forgets at a given rate, and the powers that fit.
+struct SpectrumDescription {
+  double walk_decay_per_s = 0;
+  NoisePowers power = NoisePowers::Zero();
+  double deviance = 0;            ///< −2 ln of the likelihood of the record but for a constant
+  std::vector<SpectrumBin> bins;  ///< with the densities that belong to the rate
+};
+
 /// Noise of one channel in units of the record ("U"; V for the outputs of a triad).
 struct NoiseModel {
   NoiseTerm Q;  ///< quantization, U·s:             σ² = 3Q²/τ²
@@ -74,6 +82,9 @@ struct NoiseModel {
   /// Correlation of the five coefficients, order Q N B K R; zero rows for terms at zero.
   NoisePowerMatrix correlation = NoisePowerMatrix::Zero();
   std::vector<SpectrumBin> spectrum;  ///< what the record says about the powers
+  /// The record by walks that forget faster and faster, the unbounded walk first: a run that sees
+  /// longer times may prefer another than the record does. Empty without a static record.
+  std::vector<SpectrumDescription> descriptions;
 };
 
 /// [Q² N² B² K² R²] as identified. The ramp counts only when it is present: an unproven trend

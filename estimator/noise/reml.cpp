@@ -47,12 +47,15 @@ NoisePool::NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& w
       unit_(unit_covariances(windows, model.walk_decay_per_s)),
       mean_(mean),
       design_(design),
-      start_(noise_powers(model)) {
+      start_(noise_powers(model)),
+      walk_decay_per_s_(model.walk_decay_per_s) {
   assert(mean.size() == design.rows() && mean.size() > design.cols());
   assert(extra_variance.size() == 0 || extra_variance.size() == mean.size());
-  known_ = start_(kTermR) * unit_[kTermR];
+  start_(kTermR) = 0;
+  known_ = Eigen::MatrixXd::Zero(mean.size(), mean.size());
   if (extra_variance.size() > 0) known_.diagonal() += extra_variance;
   known_.diagonal().array() += shared_rounding_variance(model);
+  pooled_ = pool();
 }
 
 Eigen::MatrixXd NoisePool::covariance(const NoisePowers& power) const {
@@ -133,7 +136,7 @@ NoisePool::Point NoisePool::maximise(const Eigen::Vector4d& start, unsigned free
   return now;
 }
 
-PooledNoise NoisePool::pooled() const {
+PooledNoise NoisePool::pool() const {
   Eigen::Vector4d start = start_.head<kVarianceTerms>();
   // A term that the record puts at zero starts at one per cent of the white variance of the means.
   const Eigen::Index middle = mean_.size() / 2;
@@ -147,9 +150,49 @@ PooledNoise NoisePool::pooled() const {
   result.power = start_;
   result.power.head<kVarianceTerms>() = best.power;
   result.information.topLeftCorner<4, 4>() = 0.5 * best.normal;
+  result.walk_decay_per_s = walk_decay_per_s_;
   result.covariance = covariance(result.power);
+  result.deviance = best.deviance;
   result.converged = best.converged;
   return result;
+}
+
+NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                    const Eigen::VectorXd& extra_variance) {
+  const std::vector<SpectrumDescription>& descriptions = model.descriptions;
+  if (descriptions.empty()) return {model, windows, mean, design, extra_variance};
+  const auto pool_at = [&](std::size_t index) {
+    const SpectrumDescription& description = descriptions[index];
+    NoiseModel reading = model;
+    reading.walk_decay_per_s = description.walk_decay_per_s;
+    reading.spectrum = description.bins;
+    reading.Q.value = std::sqrt(description.power(kTermQ));
+    reading.N.value = std::sqrt(description.power(kTermN));
+    reading.B.value = std::sqrt(description.power(kTermB));
+    reading.K.value = std::sqrt(description.power(kTermK));
+    return NoisePool(reading, windows, mean, design, extra_variance);
+  };
+  // Downhill from the record's own favourite; longer correlation times come first, since the run is
+  // what sees them.
+  const auto favourite =
+      std::min_element(descriptions.begin(), descriptions.end(),
+                       [](const auto& a, const auto& b) { return a.deviance < b.deviance; });
+  auto index = static_cast<std::size_t>(favourite - descriptions.begin());
+  NoisePool best = pool_at(index);
+  const auto descend = [&](auto next) {
+    bool moved = false;
+    while (next(index) < descriptions.size()) {
+      NoisePool candidate = pool_at(next(index));
+      if (candidate.pooled().deviance >= best.pooled().deviance) break;
+      best = std::move(candidate);
+      index = next(index);
+      moved = true;
+    }
+    return moved;
+  };
+  if (!descend([](std::size_t i) { return i - 1; })) descend([](std::size_t i) { return i + 1; });
+  return best;
 }
 
 }  // namespace plumbline

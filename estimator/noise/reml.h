@@ -14,14 +14,18 @@ namespace plumbline {
 struct PooledNoise {
   NoisePowers power = NoisePowers::Zero();                  ///< [Q² N² B² K² R²]
   NoisePowerMatrix information = NoisePowerMatrix::Zero();  ///< of both sources about them
-  Eigen::MatrixXd covariance;  ///< n×n of the window means with these powers
+  double walk_decay_per_s = 0;  ///< of K: whether it is a walk or bounded
+  Eigen::MatrixXd covariance;   ///< n×n of the window means with these powers
+  double deviance = 0;          ///< −2 ln of the restricted likelihood but for a constant
   bool converged = false;
 };
 
 /// Restricted maximum likelihood (Patterson & Thompson, 1971) of the noise powers given window
 /// means y = design·β + noise, β free, times the likelihood of the record that `model` came from.
-/// The ramp and rounding stay as the model says. A record that determines white noise well pins it;
-/// the slow terms, which a record shorter than the run barely determines, move.
+/// Rounding stays as the model says. The ramp of the record is not carried on: over the run a slow
+/// drift is told by the run itself, and flicker and random walk take it up. A record that
+/// determines white noise well pins it; the slow terms, which a record shorter than the run barely
+/// determines, move.
 class NoisePool {
  public:
   /// mean: n; design: n×p of full rank, n > p; extra_variance: n further known variances
@@ -31,7 +35,7 @@ class NoisePool {
             const Eigen::VectorXd& extra_variance);
 
   /// Maximum over both sources.
-  PooledNoise pooled() const;
+  const PooledNoise& pooled() const { return pooled_; }
 
   /// Σ of the window means at given powers.
   Eigen::MatrixXd covariance(const NoisePowers& power) const;
@@ -43,6 +47,7 @@ class NoisePool {
   struct Point;
   Point evaluate(const Eigen::Vector4d& power) const;
   Point maximise(const Eigen::Vector4d& start, unsigned free) const;
+  PooledNoise pool() const;
 
   std::vector<SpectrumBin> spectrum_;
   std::array<Eigen::MatrixXd, kTermCount> unit_;
@@ -50,7 +55,15 @@ class NoisePool {
   Eigen::VectorXd mean_;
   Eigen::MatrixXd design_;
   NoisePowers start_;
+  double walk_decay_per_s_ = 0;
+  PooledNoise pooled_;
 };
+
+/// The pool that describes record and run best, over the walks that the record was described by:
+/// what a short record takes for a random walk need not go on for the whole run.
+NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                    const Eigen::VectorXd& extra_variance);
 
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.

@@ -170,33 +170,41 @@ Vector4 starting_powers(const std::vector<Bin>& bins, unsigned allowed) {
   return power;
 }
 
-/// Spectrum with the walk that describes it best, and the powers that do.
+/// The record by one kind of walk.
 struct Description {
   double decay_per_s = 0;
   std::vector<Bin> bins;
   Maximum best;
 };
 
-Description describe(const std::vector<double>& c, double rate_hz) {
+/// The unbounded walk first, then walks that forget faster and faster.
+std::vector<Description> describe(const std::vector<double>& c, double rate_hz) {
   constexpr unsigned kAll = (1U << kStochastic) - 1;
+  const double duration_s = static_cast<double>(c.size()) / rate_hz;
+  std::vector<Description> descriptions(1);
+  for (double time_s = 0.25 * duration_s; time_s * rate_hz > 10; time_s *= 0.5)
+    descriptions.emplace_back().decay_per_s = 1 / time_s;
+  for (Description& description : descriptions) {
+    description.bins = make_bins(c, rate_hz, description.decay_per_s);
+    description.best =
+        maximise(description.bins, kAll, starting_powers(description.bins, kAll), Vector4::Zero());
+  }
+  return descriptions;
+}
+
+/// The description that the record alone supports: the walk, unless a bounded one is clearly
+/// better.
+std::size_t best_description(const std::vector<Description>& descriptions) {
   // A correlation time is one more parameter, and the best of several: χ²₁ at 0.2 %.
   constexpr double kDecayGain = 9.5;
-  const auto with_decay = [&](double decay_per_s) {
-    Description result{decay_per_s, make_bins(c, rate_hz, decay_per_s), {}};
-    result.best = maximise(result.bins, kAll, starting_powers(result.bins, kAll), Vector4::Zero());
-    return result;
-  };
-  const Description walk = with_decay(0);
-  Description chosen = walk;
-  double threshold = walk.best.deviance - kDecayGain;
-  const double duration_s = static_cast<double>(c.size()) / rate_hz;
-  for (double time_s = 0.25 * duration_s; time_s * rate_hz > 10; time_s *= 0.5) {
-    Description bounded = with_decay(1 / time_s);
-    if (bounded.best.deviance >= threshold) continue;
-    threshold = bounded.best.deviance;
-    chosen = std::move(bounded);
+  std::size_t best = 0;
+  double threshold = descriptions[0].best.deviance - kDecayGain;
+  for (std::size_t i = 1; i < descriptions.size(); ++i) {
+    if (descriptions[i].best.deviance >= threshold) continue;
+    threshold = descriptions[i].best.deviance;
+    best = i;
   }
-  return chosen;
+  return best;
 }
 
 /// Power of term i at which the profile deviance has risen by 2.71 (one-sided 95 %).
@@ -303,12 +311,20 @@ TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
   assert(record.size() >= 32 && rate_hz > 0);
   const std::vector<double> c = cosine_transform(record);
   constexpr unsigned kAll = (1U << kStochastic) - 1;
-  const Description described = describe(c, rate_hz);
-  const std::vector<Bin>& bins = described.bins;
-  const Maximum& best = described.best;
+  const std::vector<Description> descriptions = describe(c, rate_hz);
+  const Description& chosen = descriptions[best_description(descriptions)];
+  const std::vector<Bin>& bins = chosen.bins;
+  const Maximum& best = chosen.best;
 
   TermFit fit;
-  fit.walk_decay_per_s = described.decay_per_s;
+  fit.walk_decay_per_s = chosen.decay_per_s;
+  for (const Description& description : descriptions) {
+    SpectrumDescription& row = fit.descriptions.emplace_back();
+    row.walk_decay_per_s = description.decay_per_s;
+    row.power.head<kStochastic>() = description.best.power;
+    row.deviance = description.best.deviance;
+    row.bins = description.bins;
+  }
   fit.converged = best.converged;
   fit.spectrum = bins;
   fit.power.head<kStochastic>() = best.power;

@@ -34,6 +34,7 @@ struct TermFit {
   double line_amplitude = 0;  ///< of the sine, U
   bool converged = false;
   std::vector<SpectrumBin> spectrum;
+  std::vector<SpectrumDescription> descriptions;  ///< see NoiseModel
 };
 
 /// Fits a record of at least 32 samples (precondition). Spectral densities of the sampled terms,

@@ -67,6 +67,8 @@ TEST(Calibrate, FollowsTheEstimateFromPoseToPose) {
 
 TEST(Calibrate, SaysWhenTheModelLacksSomething) {
   SyntheticOptions options;
+  options.delta_step_deg = 20;
+  options.h_step_deg = 10;
   options.k2_x_V_per_g2 = 0.032 * 0.05;
   const Calibration result = calibrated(synthetic_run(3, kSixteenBits, options));
   EXPECT_EQ(result.diagnosis.verdict, Verdict::unexplained);
@@ -113,7 +115,7 @@ TEST(Calibrate, DecidesAgainstTheLimit) {
 TEST(Calibrate, UncertainGravityScalesAllOfK) {
   SyntheticRun data = synthetic_run(8, kSixteenBits);
   data.description.gravity.u_mps2 = 0.0981;  // one per cent
-  const AxisEstimate& estimate = calibrated(data).estimates.batch_ls[0];
+  const AxisEstimate estimate = calibrated(data).estimates.batch_ls[0];
   EXPECT_NEAR(std::sqrt(estimate.covariance(0, 0)), 0.01 * estimate.value(0),
               1e-3 * estimate.value(0));
   const double correlation =

@@ -15,6 +15,7 @@ struct Example {
   const char* name;
   bool clean;
   PerAxis<double> before_mps2;          ///< `before_pose_rms`, any effect left in
+  PerAxis<double> oracle_mps2;          ///< `oracle_pose_rms`, the effect taken out
   PerAxis<double> confirm_before_mps2;  ///< `confirm_before`
 };
 
@@ -44,8 +45,11 @@ TEST_P(ExampleSet, ResidualAndVerdict) {
     EXPECT_NEAR(result.before.fit_pose_rms_mps2[axis], example.before_mps2[axis],
                 tolerance * example.before_mps2[axis]);
     EXPECT_GE(result.before.heldout_pose_rms_mps2[axis], result.before.fit_pose_rms_mps2[axis]);
-    EXPECT_NEAR(confirmed.before.pose_rms_mps2[axis], example.confirm_before_mps2[axis],
-                0.15 * example.confirm_before_mps2[axis]);
+    // The fit of the truth file weighs all poses alike: where an effect is left in, ours may do
+    // better or a little worse.
+    EXPECT_LT(confirmed.before.pose_rms_mps2[axis], 1.1 * example.confirm_before_mps2[axis]);
+    EXPECT_LT(result.floor_pose_rms_mps2[axis], 1.1 * example.oracle_mps2[axis]);
+    EXPECT_GT(result.floor_pose_rms_mps2[axis], 0.9 * example.oracle_mps2[axis]);
     EXPECT_LE(result.estimates.agreement_en[axis], 1.0);
     EXPECT_LT((result.estimates.rls->at(axis).value - result.estimates.batch_ls[axis].value).norm(),
               1e-10);
@@ -56,18 +60,22 @@ INSTANTIATE_TEST_SUITE_P(All, ExampleSet,
                          testing::Values(Example{"clean",
                                                  true,
                                                  {0.0279654, 0.0277775, 0.0259205},
+                                                 {0.0279654, 0.0277775, 0.0259205},
                                                  {0.0287560, 0.0276176, 0.0406881}},
                                          Example{"quadratic",
                                                  false,
                                                  {0.1404820, 0.0299989, 0.0235391},
+                                                 {0.0243605, 0.0299989, 0.0235391},
                                                  {0.1261580, 0.0239705, 0.0257255}},
                                          Example{"base-roll",
                                                  false,
                                                  {0.1034594, 0.1008033, 0.0277373},
+                                                 {0.0290822, 0.0291715, 0.0272753},
                                                  {0.1041377, 0.1169480, 0.0400807}},
                                          Example{"temperature-and-backlash",
                                                  false,
                                                  {0.1078229, 0.1081693, 0.1232544},
+                                                 {0.0247632, 0.0254345, 0.0285232},
                                                  {0.1185593, 0.1107623, 0.1063779}}),
                          [](const auto& parameter) {
                            std::string name = parameter.param.name;
