@@ -18,6 +18,7 @@
 #include "estimator/kinematics.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/identify.h"
+#include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
@@ -271,13 +272,15 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /
   result.pose_results.resize(n);
 
   PerAxis<AxisWork> work;
+  parallel_for(kAxisCount, [&](std::size_t axis) {
+    result.noise[axis] = identify(input, axis);
+    work[axis] = fit_axis(experiment, result.noise[axis], axis);
+  });
   VerdictInput verdict;
   verdict.poses = n;
   double worst_error_mps2 = -1;
   double u_worst_mps2 = 0;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    result.noise[axis] = identify(input, axis);
-    work[axis] = fit_axis(experiment, result.noise[axis], axis);
     const AxisWork& w = work[axis];
     const double mps2_per_V = input_referred_mps2_per_V(w.fit.estimate, axis);
     result.diagnosis.axis_test[axis] = {w.test.chi2, w.test.dof, w.test.p_value};

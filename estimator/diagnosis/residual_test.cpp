@@ -167,20 +167,24 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   const Eigen::Index n = y.size();
   const Eigen::MatrixXd functions =
       structure_functions(input.specific_force, input.drivers, input.design);
-  const NoisePool plain_pool =
-      best_pool(noise, input.windows, y, input.design, input.extra_variance);
+  Eigen::MatrixXd full(n, input.design.cols() + functions.cols());
+  full << input.design, functions;
+  const bool enough = n >= input.design.cols() + 3 * functions.cols();
+  // The kind of walk is chosen beside the functions where that is possible: structure that is left
+  // in would pass for one.
+  const NoiseModel model =
+      best_walk(noise, input.windows, y, enough ? full : input.design, input.extra_variance);
+  const NoisePool plain_pool(model, input.windows, y, input.design, input.extra_variance);
   const Judgement plain =
       judge(plain_pool, plain_pool.pooled(), y, input.design, functions, input.design.cols());
   ResidualTestResult result;
   result.noise = plain.noise;
-  result.p_structure = plain.p_structure;
+  result.p_structure = 1;
   Eigen::MatrixXd P = plain.P;
-  if (n >= input.design.cols() + 3 * functions.cols()) {
+  if (enough) {
     // With the noise estimated beside the model alone, structure is partly taken for slow noise;
     // beside the functions, too, slow noise is partly taken for structure. Both count.
-    Eigen::MatrixXd full(n, input.design.cols() + functions.cols());
-    full << input.design, functions;
-    const NoisePool rich_pool = best_pool(noise, input.windows, y, full, input.extra_variance);
+    const NoisePool rich_pool(model, input.windows, y, full, input.extra_variance);
     const Judgement rich =
         judge(rich_pool, rich_pool.pooled(), y, input.design, functions, full.cols());
     result.p_structure = merged(plain.p_structure, rich.p_structure);
@@ -188,8 +192,6 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
       result.noise = rich.noise;
       P = rich.P;
     }
-  } else {
-    result.p_structure = 1;
   }
   const Projector before = make_projector(result.noise.covariance, input.design);
   result.chi2 = y.dot(before.P * y);

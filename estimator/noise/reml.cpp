@@ -157,42 +157,46 @@ PooledNoise NoisePool::pool() const {
   return result;
 }
 
-NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                    const Eigen::VectorXd& extra_variance) {
+NoiseModel with_walk(const NoiseModel& model, const SpectrumDescription& description) {
+  NoiseModel reading = model;
+  reading.walk_decay_per_s = description.walk_decay_per_s;
+  reading.spectrum = description.bins;
+  reading.Q.value = std::sqrt(description.power(kTermQ));
+  reading.N.value = std::sqrt(description.power(kTermN));
+  reading.B.value = std::sqrt(description.power(kTermB));
+  reading.K.value = std::sqrt(description.power(kTermK));
+  return reading;
+}
+
+NoiseModel best_walk(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                     const Eigen::VectorXd& extra_variance) {
   const std::vector<SpectrumDescription>& descriptions = model.descriptions;
-  if (descriptions.empty()) return {model, windows, mean, design, extra_variance};
-  const auto pool_at = [&](std::size_t index) {
-    const SpectrumDescription& description = descriptions[index];
-    NoiseModel reading = model;
-    reading.walk_decay_per_s = description.walk_decay_per_s;
-    reading.spectrum = description.bins;
-    reading.Q.value = std::sqrt(description.power(kTermQ));
-    reading.N.value = std::sqrt(description.power(kTermN));
-    reading.B.value = std::sqrt(description.power(kTermB));
-    reading.K.value = std::sqrt(description.power(kTermK));
-    return NoisePool(reading, windows, mean, design, extra_variance);
+  if (descriptions.empty()) return model;
+  const auto deviance = [&](std::size_t index) {
+    const NoiseModel reading = with_walk(model, descriptions[index]);
+    return NoisePool(reading, windows, mean, design, extra_variance).pooled().deviance;
   };
   // Downhill from the record's own favourite; longer correlation times come first, since the run is
   // what sees them.
   const auto favourite =
       std::min_element(descriptions.begin(), descriptions.end(),
                        [](const auto& a, const auto& b) { return a.deviance < b.deviance; });
-  auto index = static_cast<std::size_t>(favourite - descriptions.begin());
-  NoisePool best = pool_at(index);
+  auto best = static_cast<std::size_t>(favourite - descriptions.begin());
+  double lowest = deviance(best);
   const auto descend = [&](auto next) {
     bool moved = false;
-    while (next(index) < descriptions.size()) {
-      NoisePool candidate = pool_at(next(index));
-      if (candidate.pooled().deviance >= best.pooled().deviance) break;
-      best = std::move(candidate);
-      index = next(index);
+    for (std::size_t index = next(best); index < descriptions.size(); index = next(index)) {
+      const double value = deviance(index);
+      if (value >= lowest) break;
+      lowest = value;
+      best = index;
       moved = true;
     }
     return moved;
   };
   if (!descend([](std::size_t i) { return i - 1; })) descend([](std::size_t i) { return i + 1; });
-  return best;
+  return with_walk(model, descriptions[best]);
 }
 
 }  // namespace plumbline

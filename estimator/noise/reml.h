@@ -59,11 +59,12 @@ class NoisePool {
   PooledNoise pooled_;
 };
 
-/// The pool that describes record and run best, over the walks that the record was described by:
-/// what a short record takes for a random walk need not go on for the whole run.
-NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                    const Eigen::VectorXd& extra_variance);
+/// `model` with the walk, out of those that the record was described by, that describes record and
+/// run best: what a short record takes for a random walk need not go on for the whole run. Without
+/// a record the model is returned as it is.
+NoiseModel best_walk(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                     const Eigen::VectorXd& extra_variance);
 
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.

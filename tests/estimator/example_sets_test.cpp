@@ -48,8 +48,8 @@ TEST_P(ExampleSet, ResidualAndVerdict) {
     // The fit of the truth file weighs all poses alike: where an effect is left in, ours may do
     // better or a little worse.
     EXPECT_LT(confirmed.before.pose_rms_mps2[axis], 1.1 * example.confirm_before_mps2[axis]);
-    EXPECT_LT(result.floor_pose_rms_mps2[axis], 1.1 * example.oracle_mps2[axis]);
-    EXPECT_GT(result.floor_pose_rms_mps2[axis], 0.9 * example.oracle_mps2[axis]);
+    EXPECT_LT(result.floor_pose_rms_mps2[axis], 1.2 * example.oracle_mps2[axis]);
+    EXPECT_GT(result.floor_pose_rms_mps2[axis], 0.8 * example.oracle_mps2[axis]);
     EXPECT_LE(result.estimates.agreement_en[axis], 1.0);
     EXPECT_LT((result.estimates.rls->at(axis).value - result.estimates.batch_ls[axis].value).norm(),
               1e-10);
