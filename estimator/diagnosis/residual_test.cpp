@@ -172,9 +172,10 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   const bool enough = n >= input.design.cols() + 3 * functions.cols();
   // The kind of walk is chosen beside the functions where that is possible: structure that is left
   // in would pass for one.
-  const NoiseModel model =
-      best_walk(noise, input.windows, y, enough ? full : input.design, input.extra_variance);
-  const NoisePool plain_pool(model, input.windows, y, input.design, input.extra_variance);
+  const NoisePool best =
+      best_pool(noise, input.windows, y, enough ? full : input.design, input.extra_variance);
+  const NoisePool plain_pool =
+      enough ? NoisePool(best.model(), input.windows, y, input.design, input.extra_variance) : best;
   const Judgement plain =
       judge(plain_pool, plain_pool.pooled(), y, input.design, functions, input.design.cols());
   ResidualTestResult result;
@@ -184,9 +185,7 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   if (enough) {
     // With the noise estimated beside the model alone, structure is partly taken for slow noise;
     // beside the functions, too, slow noise is partly taken for structure. Both count.
-    const NoisePool rich_pool(model, input.windows, y, full, input.extra_variance);
-    const Judgement rich =
-        judge(rich_pool, rich_pool.pooled(), y, input.design, functions, full.cols());
+    const Judgement rich = judge(best, best.pooled(), y, input.design, functions, full.cols());
     result.p_structure = merged(plain.p_structure, rich.p_structure);
     if (result.p_structure < kStructureSeen) {
       result.noise = rich.noise;

@@ -43,12 +43,11 @@ struct NoisePool::Point {
 NoisePool::NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
                      const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                      const Eigen::VectorXd& extra_variance)
-    : spectrum_(model.spectrum),
+    : model_(model),
       unit_(unit_covariances(windows, model.walk_decay_per_s)),
       mean_(mean),
       design_(design),
-      start_(noise_powers(model)),
-      walk_decay_per_s_(model.walk_decay_per_s) {
+      start_(noise_powers(model)) {
   assert(mean.size() == design.rows() && mean.size() > design.cols());
   assert(extra_variance.size() == 0 || extra_variance.size() == mean.size());
   start_(kTermR) = 0;
@@ -68,8 +67,8 @@ Eigen::MatrixXd NoisePool::covariance(const NoisePowers& power) const {
 NoisePool::Point NoisePool::evaluate(const Eigen::Vector4d& power) const {
   Point point;
   point.power = power;
-  if (!spectrum_.empty()) {
-    const Likelihood record = spectrum_likelihood(spectrum_, power);
+  if (!model_.spectrum.empty()) {
+    const Likelihood record = spectrum_likelihood(model_.spectrum, power);
     point.deviance += record.deviance;
     point.normal += record.normal;
     point.right += record.right;
@@ -144,38 +143,37 @@ PooledNoise NoisePool::pool() const {
   if (!(start(kTermB) > 0)) start(kTermB) = 0.01 * white;
   if (!(start(kTermK) > 0)) start(kTermK) = 0.01 * white / unit_[kTermK](middle, middle);
   // The means cannot tell quantization from white noise: without a record it stays at zero.
-  const unsigned free = spectrum_.size() > 4 ? kAllTerms : kAllTerms & ~1U;
+  const unsigned free = model_.spectrum.size() > 4 ? kAllTerms : kAllTerms & ~1U;
   const Point best = maximise(start, free);
   PooledNoise result;
   result.power = start_;
   result.power.head<kVarianceTerms>() = best.power;
   result.information.topLeftCorner<4, 4>() = 0.5 * best.normal;
-  result.walk_decay_per_s = walk_decay_per_s_;
+  result.walk_decay_per_s = model_.walk_decay_per_s;
   result.covariance = covariance(result.power);
   result.deviance = best.deviance;
   result.converged = best.converged;
   return result;
 }
 
-NoiseModel with_walk(const NoiseModel& model, const SpectrumDescription& description) {
-  NoiseModel reading = model;
-  reading.walk_decay_per_s = description.walk_decay_per_s;
-  reading.spectrum = description.bins;
-  reading.Q.value = std::sqrt(description.power(kTermQ));
-  reading.N.value = std::sqrt(description.power(kTermN));
-  reading.B.value = std::sqrt(description.power(kTermB));
-  reading.K.value = std::sqrt(description.power(kTermK));
-  return reading;
+NoiseModel NoisePool::model() const {
+  NoiseModel result = model_;
+  result.Q.value = std::sqrt(pooled_.power(kTermQ));
+  result.N.value = std::sqrt(pooled_.power(kTermN));
+  result.B.value = std::sqrt(pooled_.power(kTermB));
+  result.K.value = std::sqrt(pooled_.power(kTermK));
+  return result;
 }
 
-NoiseModel best_walk(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                     const Eigen::VectorXd& extra_variance) {
+NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                    const Eigen::VectorXd& extra_variance) {
   const std::vector<SpectrumDescription>& descriptions = model.descriptions;
-  if (descriptions.empty()) return model;
-  const auto deviance = [&](std::size_t index) {
-    const NoiseModel reading = with_walk(model, descriptions[index]);
-    return NoisePool(reading, windows, mean, design, extra_variance).pooled().deviance;
+  if (descriptions.empty()) return {model, windows, mean, design, extra_variance};
+  const auto pool_at = [&](std::size_t index, NoiseModel start) {
+    start.walk_decay_per_s = descriptions[index].walk_decay_per_s;
+    start.spectrum = descriptions[index].bins;
+    return NoisePool(start, windows, mean, design, extra_variance);
   };
   // Downhill from the record's own favourite; longer correlation times come first, since the run is
   // what sees them.
@@ -183,20 +181,29 @@ NoiseModel best_walk(const NoiseModel& model, const std::vector<SampleWindow>& w
       std::min_element(descriptions.begin(), descriptions.end(),
                        [](const auto& a, const auto& b) { return a.deviance < b.deviance; });
   auto best = static_cast<std::size_t>(favourite - descriptions.begin());
-  double lowest = deviance(best);
+  NoiseModel first = model;
+  first.Q.value = std::sqrt(favourite->power(kTermQ));
+  first.N.value = std::sqrt(favourite->power(kTermN));
+  first.B.value = std::sqrt(favourite->power(kTermB));
+  first.K.value = std::sqrt(favourite->power(kTermK));
+  NoisePool pool = pool_at(best, first);
   const auto descend = [&](auto next) {
     bool moved = false;
     for (std::size_t index = next(best); index < descriptions.size(); index = next(index)) {
-      const double value = deviance(index);
-      if (value >= lowest) break;
-      lowest = value;
+      // Powers change little from one correlation time to the next: a good place to start.
+      NoiseModel start = pool.model();
+      const double before = descriptions[best].power(kTermK);
+      if (before > 0) start.K.value *= std::sqrt(descriptions[index].power(kTermK) / before);
+      NoisePool candidate = pool_at(index, start);
+      if (candidate.pooled().deviance >= pool.pooled().deviance) break;
+      pool = std::move(candidate);
       best = index;
       moved = true;
     }
     return moved;
   };
   if (!descend([](std::size_t i) { return i - 1; })) descend([](std::size_t i) { return i + 1; });
-  return with_walk(model, descriptions[best]);
+  return pool;
 }
 
 }  // namespace plumbline

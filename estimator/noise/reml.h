@@ -36,6 +36,8 @@ class NoisePool {
 
   /// Maximum over both sources.
   const PooledNoise& pooled() const { return pooled_; }
+  /// The model that was given, with the pooled coefficients.
+  NoiseModel model() const;
 
   /// Σ of the window means at given powers.
   Eigen::MatrixXd covariance(const NoisePowers& power) const;
@@ -49,22 +51,20 @@ class NoisePool {
   Point maximise(const Eigen::Vector4d& start, unsigned free) const;
   PooledNoise pool() const;
 
-  std::vector<SpectrumBin> spectrum_;
+  NoiseModel model_;
   std::array<Eigen::MatrixXd, kTermCount> unit_;
   Eigen::MatrixXd known_;  // ramp, rounding and extra variance
   Eigen::VectorXd mean_;
   Eigen::MatrixXd design_;
   NoisePowers start_;
-  double walk_decay_per_s_ = 0;
   PooledNoise pooled_;
 };
 
-/// `model` with the walk, out of those that the record was described by, that describes record and
-/// run best: what a short record takes for a random walk need not go on for the whole run. Without
-/// a record the model is returned as it is.
-NoiseModel best_walk(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                     const Eigen::VectorXd& extra_variance);
+/// The pool with the walk, out of those that the record was described by, that describes record and
+/// run best: what a short record takes for a random walk need not go on for the whole run.
+NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
+                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                    const Eigen::VectorXd& extra_variance);
 
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.
