@@ -78,29 +78,45 @@ NoisePool::Point NoisePool::evaluate(const Eigen::Vector4d& power) const {
   const Projector projector = make_projector(covariance(powers), design_);
   const Eigen::VectorXd py = projector.P * mean_;
   point.deviance += projector.log_determinant + mean_.dot(py);
-  std::array<Eigen::MatrixXd, kVarianceTerms> pc;
-  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
-    if (i == kTermN)  // diagonal
-      pc[i] = projector.P * unit_[i].diagonal().asDiagonal();
-    else if (i != kTermQ || power(kTermQ) > 0)
-      pc[i].noalias() = projector.P * unit_[i];
-    else
-      pc[i] = projector.P * unit_[i].diagonal().asDiagonal();
-  }
-  Eigen::Matrix4d normal;
+  // The average information (Gilmour, Thompson & Cullis, 1995) has the expected one's mean and
+  // costs products with vectors only.
+  Eigen::Matrix<double, Eigen::Dynamic, kVarianceTerms> seen(mean_.size(), kVarianceTerms);
   Eigen::Vector4d score;
-  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
-    const auto a = static_cast<Eigen::Index>(i);
-    score(a) = py.dot(unit_[i] * py) - pc[i].trace();
-    for (std::size_t j = 0; j <= i; ++j) {
-      const auto b = static_cast<Eigen::Index>(j);
-      normal(a, b) = pc[i].cwiseProduct(pc[j].transpose()).sum();
-      normal(b, a) = normal(a, b);
-    }
+  for (Eigen::Index i = 0; i < kVarianceTerms; ++i) {
+    const Eigen::MatrixXd& unit = unit_[static_cast<std::size_t>(i)];
+    seen.col(i) = unit * py;
+    score(i) = py.dot(seen.col(i)) - projector.P.cwiseProduct(unit).sum();
   }
+  const Eigen::Matrix4d normal = seen.transpose() * projector.P * seen;
   point.normal += normal;
   point.right += normal * power + score;
   return point;
+}
+
+Eigen::Matrix4d NoisePool::expected_information(const Eigen::Vector4d& power) const {
+  NoisePowers powers = start_;
+  powers.head<kVarianceTerms>() = power;
+  const Eigen::MatrixXd P = make_projector(covariance(powers), design_).P;
+  std::array<Eigen::MatrixXd, kVarianceTerms> pc;
+  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
+    // Quantization is nearly diagonal: windows that touch share a little.
+    if (i == kTermB || i == kTermK)
+      pc[i].noalias() = P * unit_[i];
+    else
+      pc[i] = P * unit_[i].diagonal().asDiagonal();
+  }
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+  if (!model_.spectrum.empty()) normal = spectrum_likelihood(model_.spectrum, power).normal;
+  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double value = pc[i].cwiseProduct(pc[j].transpose()).sum();
+      const auto a = static_cast<Eigen::Index>(i);
+      const auto b = static_cast<Eigen::Index>(j);
+      normal(a, b) += value;
+      if (a != b) normal(b, a) += value;
+    }
+  }
+  return 0.5 * normal;
 }
 
 NoisePool::Point NoisePool::maximise(const Eigen::Vector4d& start, unsigned free) const {
@@ -148,7 +164,7 @@ PooledNoise NoisePool::pool() const {
   PooledNoise result;
   result.power = start_;
   result.power.head<kVarianceTerms>() = best.power;
-  result.information.topLeftCorner<4, 4>() = 0.5 * best.normal;
+  result.information.topLeftCorner<4, 4>() = expected_information(best.power);
   result.walk_decay_per_s = model_.walk_decay_per_s;
   result.covariance = covariance(result.power);
   result.deviance = best.deviance;

@@ -48,6 +48,7 @@ class NoisePool {
  private:
   struct Point;
   Point evaluate(const Eigen::Vector4d& power) const;
+  Eigen::Matrix4d expected_information(const Eigen::Vector4d& power) const;
   Point maximise(const Eigen::Vector4d& start, unsigned free) const;
   PooledNoise pool() const;
 
