@@ -258,6 +258,7 @@ Figure convergence_figure(const Calibration& calibration) {
         const double two_u = 2 * std::sqrt(final.covariance(j, j));
         const auto curve = [&](const std::vector<TriadEstimate>& history) {
           std::vector<double> values;
+          values.reserve(history.size());
           for (const TriadEstimate& e : history)
             values.push_back(1e3 * (e[i].value(j) - reference));
           return values;

@@ -1,6 +1,7 @@
 // `plumbline plan`: prints, checks and times what `run` would do, without hardware.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -25,7 +26,7 @@ struct PlanArguments {
 };
 
 std::string minutes(double seconds) {
-  const auto whole = static_cast<long>(seconds + 0.5);
+  const auto whole = std::lround(seconds);
   return fmt::format("{} min {:02} s", whole / 60, whole % 60);
 }
 

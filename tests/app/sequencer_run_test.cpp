@@ -30,7 +30,11 @@ using storage::PoseKind;
 using storage::RunState;
 using testing::HasSubstr;
 
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr double kSpeed = 20;  // what the simulator keeps up with when it is instrumented
+#else
 constexpr double kSpeed = 100;
+#endif
 
 std::string text_of(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -105,7 +109,7 @@ class SequencerRun : public testing::Test {
     const auto first = (*head)->status();
     ASSERT_TRUE(first.has_value()) << first.error().message;
     EXPECT_FALSE(first->moving);
-    std::this_thread::sleep_for(milliseconds{20});  // 2 s of the rig's time
+    std::this_thread::sleep_for(std::chrono::duration<double>(2 / kSpeed));  // 2 s for the rig
     const auto later = (*head)->status();
     ASSERT_TRUE(later.has_value());
     EXPECT_EQ(first->actual.delta_deg, later->actual.delta_deg);
