@@ -51,12 +51,17 @@ struct AxisWork {
 
 double squared(double value) { return value * value; }
 
+/// Mean time between the samples of the static record; a thousandth of a second without one.
+double static_step_s(const SampleTable* record) {
+  if (record == nullptr || record->size() < 2) return 1e-3;
+  return (record->t_s.back() - record->t_s.front()) / static_cast<double>(record->size() - 1);
+}
+
 NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
   NoiseModel noise;
   const SampleTable* record = input.static_record;
   if (record != nullptr && record->size() > 1) {
-    const double duration_s = record->t_s.back() - record->t_s.front();
-    noise = identify_noise(record->u_V[axis], static_cast<double>(record->size() - 1) / duration_s);
+    noise = identify_noise(record->u_V[axis], 1.0 / static_step_s(record));
   } else {
     noise = identify_noise_from_bursts(input.run.samples, input.run.poses, axis);
   }
@@ -262,7 +267,8 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /
   result.observability = observability(experiment.A);
   if (result.observability.rank < 4) return result;
 
-  experiment.windows = pose_windows(input.run.samples, input.run.poses);
+  experiment.windows =
+      pose_windows(input.run.samples, input.run.poses, static_step_s(input.static_record));
   experiment.drivers = driver_means(input.run.samples, input.run.poses);
   const std::size_t n = experiment.poses.size();
   result.convergence.rls.resize(n);

@@ -8,8 +8,8 @@ namespace {
 
 /// Why nothing can be said about this axis; empty when something can.
 std::string obstacle(const VerdictInput& input, std::size_t axis) {
-  if (!input.axis[axis].noise_known) return "no noise could be identified";
   if (!input.axis[axis].responds) return "the output does not follow the specific force";
+  if (!input.axis[axis].noise_known) return "no noise could be identified";
   return {};
 }
 

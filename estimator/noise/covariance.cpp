@@ -56,7 +56,8 @@ Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double de
 
 }  // namespace
 
-std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses) {
+std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses,
+                                       double single_step_s) {
   std::vector<SampleWindow> windows;
   windows.reserve(poses.size());
   std::vector<double> steps;
@@ -76,7 +77,7 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
     windows.push_back({samples.t_s[pose.first], step, pose.count});
   }
   for (SampleWindow& window : windows)
-    if (window.step_s == 0) window.step_s = other_step > 0 ? other_step : 1e-3;
+    if (window.step_s == 0) window.step_s = other_step > 0 ? other_step : single_step_s;
   return windows;
 }
 

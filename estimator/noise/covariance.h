@@ -17,8 +17,10 @@ struct SampleWindow {
   std::size_t count = 0;
 };
 
-/// The windows of the poses: first sample, median spacing, number.
-std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses);
+/// The windows of the poses: first sample, median spacing, number. A pose of a single sample gets
+/// the spacing of another pose, or `single_step_s` when all poses are single samples.
+std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses,
+                                       double single_step_s);
 
 /// Covariance of the window means for each term with coefficient 1, n×n each, so that the whole is
 /// Σ power_j · unit_j.

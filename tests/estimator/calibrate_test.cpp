@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/estimator/synthetic_run.h"
@@ -102,6 +103,45 @@ TEST(Calibrate, FewPosesCannotBeJudged) {
   EXPECT_EQ(result.poses, 9u);
   EXPECT_EQ(result.diagnosis.verdict, Verdict::undetermined);
   EXPECT_THAT(result.diagnosis.reason, HasSubstr("9 poses"));
+}
+
+TEST(Calibrate, DeadAxisIsNamedAndGetsNoNumbers) {
+  SyntheticRun data = synthetic_run(11, kSixteenBits);
+  for (SampleTable* table : {&data.run.samples, &data.still})
+    std::fill(table->u_V[2].begin(), table->u_V[2].end(), -2.5);
+  data.description.limits = Limits{10.0};
+  const Calibration result = calibrated(data);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::undetermined);
+  EXPECT_THAT(result.diagnosis.reason, HasSubstr("z axis: the output does not follow"));
+  EXPECT_TRUE(std::isnan(result.before.fit_pose_rms_mps2[2]));
+  EXPECT_TRUE(std::isnan(result.floor_pose_rms_mps2[2]));
+  EXPECT_GT(result.before.fit_pose_rms_mps2[0], 0);
+}
+
+TEST(Calibrate, FourPosesFitExactly) {
+  SyntheticRun data = synthetic_run(12, kSixteenBits);
+  data.run.poses = {data.run.poses[0], data.run.poses[3], data.run.poses[6], data.run.poses[30]};
+  const Calibration result = calibrated(data);
+  EXPECT_EQ(result.observability.rank, 4);
+  EXPECT_LT(result.before.fit_pose_rms_mps2[0], 1e-9);
+  EXPECT_TRUE(std::isnan(result.before.heldout_pose_rms_mps2[0]));  // no pose can be spared
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::undetermined);
+  EXPECT_LT((result.estimates.rls->at(0).value - result.estimates.batch_ls[0].value).norm(), 1e-9);
+}
+
+TEST(Calibrate, OneReadingAPose) {
+  SyntheticOptions options;
+  options.samples_per_pose = 1;
+  const SyntheticRun data = synthetic_run(13, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
+  const double expected_mps2 = 3e-4 / 0.032 * 9.80665;
+  EXPECT_NEAR(result.before.fit_pose_rms_mps2[0], expected_mps2, 0.35 * expected_mps2);
+  EXPECT_NEAR(result.floor_pose_rms_mps2[0], expected_mps2, 0.2 * expected_mps2);
+  const Calibration alone = calibrate({data.run, nullptr, data.description}, {});
+  EXPECT_EQ(alone.diagnosis.verdict, Verdict::undetermined);
+  EXPECT_THAT(alone.diagnosis.reason, HasSubstr("no noise could be identified"));
+  EXPECT_TRUE(alone.estimates.batch_ls[0].value.allFinite());
 }
 
 TEST(Calibrate, DecidesAgainstTheLimit) {
