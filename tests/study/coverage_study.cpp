@@ -1,105 +1,85 @@
-// How often do the 12 parameters lie within their 95 % interval? Simulated units with white noise
-// and nothing undeclared, each calibrated like a measured one.
-//
-//   coverage_study [UNITS [FIRST_SEED]]     200 units from seed 1 by default
-#include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <string>
-#include <vector>
+// Coverage of the 12 parameters on many simulated units: a table for each converter.
+// Exit code: 0 when every overall share lies within 93 … 97 %, 1 when one does not, 2 wrong use.
+#include <fmt/format.h>
 
-#include "estimator/calibrate.h"
-#include "rig/sim/record.h"
-#include "rig/sim/world.h"
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <thread>
+
+#include "tests/study/coverage.h"
 
 namespace {
 
-using plumbline::Adc;
-using plumbline::kAxisCount;
+using namespace plumbline::study;
 
-struct Setting {
-  std::string name;
-  Adc adc;
-  double sigma_V = 0;  ///< of one sample
-};
+constexpr double kLowestShare = 0.93;
+constexpr double kHighestShare = 0.97;
 
-struct Count {
-  int inside = 0;
-  int all = 0;
-  double percent() const { return 100.0 * inside / all; }
-};
-
-plumbline::sim::World white_world(const Setting& setting) {
-  plumbline::sim::World world;
-  world.adc = setting.adc;
-  world.scatter.random = true;
-  for (plumbline::sim::NoiseTerms& noise : world.noise_V)
-    noise.N = setting.sigma_V / std::sqrt(world.rate_hz);
-  return world;
-}
-
-void study(const Setting& setting, int units, std::uint64_t first_seed) {
-  const plumbline::sim::World world = white_world(setting);
-  std::vector<Count> parameter(4 * kAxisCount);
-  Count all;
-  Count filter;
-  double largest_en = 0;
-  int alarms = 0;
-  for (int unit = 0; unit < units; ++unit) {
-    plumbline::sim::RecordOptions options;
-    options.seed = first_seed + static_cast<std::uint64_t>(unit);
-    options.verification_poses = 0;
-    const plumbline::sim::RecordedSet set = plumbline::sim::record_set(world, options);
-    const plumbline::Calibration result =
-        plumbline::calibrate({set.run, &set.soak, set.description}, {});
-    alarms += result.diagnosis.verdict != plumbline::Verdict::clean;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const auto& K = set.truth.triad.K_V_per_g[axis];
-      const Eigen::Vector4d truth(K[0], K[1], K[2], set.truth.triad.U0_V[axis]);
-      const auto within = [&](const plumbline::AxisEstimate& estimate, Eigen::Index j) {
-        return std::abs(estimate.value(j) - truth(j)) <=
-               1.96 * std::sqrt(estimate.covariance(j, j));
-      };
-      for (Eigen::Index j = 0; j < 4; ++j) {
-        const bool inside = within(result.estimates.batch_ls[axis], j);
-        for (Count* count : {&parameter[4 * axis + static_cast<std::size_t>(j)], &all}) {
-          count->inside += inside;
-          ++count->all;
-        }
-        filter.inside += within(result.estimates.ekf[axis], j);
-        ++filter.all;
-      }
-      largest_en = std::max(largest_en, result.estimates.agreement_en[axis]);
-    }
+/// Prints the table of one converter; true when the overall share is as demanded.
+bool report(const Converter& converter, const Coverage& coverage) {
+  fmt::print("\n{}, {} units\n", to_string(converter), coverage.units);
+  fmt::print("  parameter   within 1.96u   within 2u   mean error/u   sd error/u\n");
+  for (Eigen::Index i = 0; i < kParameters; ++i) {
+    fmt::print("  {:<9} {:>12.1f} % {:>9.1f} % {:>14.3f} {:>12.3f}\n", parameter_name(i),
+               100 * coverage.share(i), 100 * coverage.share_k2(i), coverage.mean(i),
+               coverage.sd(i));
   }
-  std::printf("\n%s, %d units\n", setting.name.c_str(), units);
-  std::printf("  axis      K_ix     K_iy     K_iz     U_i0\n");
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    std::printf("  %s   ", plumbline::kAxisName[axis]);
-    for (std::size_t j = 0; j < 4; ++j) std::printf("%7.1f %%", parameter[4 * axis + j].percent());
-    std::printf("\n");
-  }
-  std::printf("  all 12: batch %.2f %%, filter %.2f %% (wanted 93 to 97)\n", all.percent(),
-              filter.percent());
-  std::printf("  largest E_n between filter and batch %.3f; verdict other than clean: %d\n",
-              largest_en, alarms);
-  std::fflush(stdout);
+  const int values = coverage.units * static_cast<int>(kParameters);
+  const Interval one = binomial_interval(coverage.units, 0.95);
+  const Interval all = binomial_interval(values, 0.95);
+  fmt::print("  {:<9} {:>12.2f} % {:>9.2f} %\n", "all", 100 * coverage.overall_share,
+             100 * coverage.overall_share_k2);
+  fmt::print(
+      "  expected by chance (95 %): {:.1f} … {:.1f} % per parameter, {:.2f} … {:.2f} % of all "
+      "{} values\n",
+      100 * one.lower, 100 * one.upper, 100 * all.lower, 100 * all.upper, values);
+  fmt::print(
+      "  standard uncertainty of the overall share, from its scatter between units: {:.2f} %\n",
+      100 * coverage.u_overall_share);
+
+  const Interval nees = nees_interval(coverage.units, 0.95);
+  fmt::print("  mean NEES {:.3f}, expected {:.3f} … {:.3f} (95 %, {} degrees of freedom a unit)\n",
+             coverage.mean_nees, nees.lower, nees.upper, kParameters);
+  fmt::print("  filter: {:.2f} % of its values within 1.96u\n", 100 * coverage.filter_share);
+  fmt::print("  filter against batch: E_n ≤ 1 for {:.2f} % of the axes, largest {:.3f}\n",
+             100 * coverage.en_within_share, coverage.largest_en);
+  fmt::print("  verdict: {:.1f} % of the units falsely \"unexplained\", {:.1f} % undecided\n",
+             100 * coverage.unexplained_share, 100 * coverage.undecided_share);
+
+  const bool holds =
+      coverage.overall_share >= kLowestShare && coverage.overall_share <= kHighestShare;
+  fmt::print("  {}: overall share {:.2f} %, demanded {:.0f} … {:.0f} %\n",
+             holds ? "holds" : "FAILS", 100 * coverage.overall_share, 100 * kLowestShare,
+             100 * kHighestShare);
+  return holds;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int units = argc > 1 ? std::atoi(argv[1]) : 200;
-  const std::uint64_t first_seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-  if (units < 1) {
-    std::fprintf(stderr, "usage: coverage_study [UNITS [FIRST_SEED]]\n");
-    return 2;
+  UnitSeries series;
+  series.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  CLI::App app{"Share of the 12 parameters within their 95 % interval, on simulated units"};
+  app.add_option("units", series.units, "number of simulated units per converter")
+      ->check(CLI::Range(2, 1000000))
+      ->capture_default_str();
+  app.add_option("--threads", series.threads, "changes the time, not the result")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  app.add_option("--seed", series.first_seed, "of the first unit; the others count up from it")
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
   }
-  const Adc sixteen{16, -5.0, 0.0};
-  const Adc twelve{12, -5.0, 0.0};
-  std::printf("Coverage of 95 %% intervals: 324 poses x 40 samples, 300 s static, white noise\n");
-  study({"16 bits, noise 0.3 mV", sixteen, 3e-4}, units, first_seed);
-  study({"12 bits, noise half a step", twelve, 0.5 * twelve.lsb_V()}, units, first_seed);
-  study({"12 bits, noise of one step", twelve, twelve.lsb_V()}, units, first_seed);
-  return 0;
+
+  bool holds = true;
+  for (const Converter& converter : converters()) {
+    const auto outcomes = calibrate_units(converter, series);
+    holds = report(converter, summarise(outcomes)) && holds;
+    series.first_seed +=
+        static_cast<std::uint64_t>(series.units);  // other units for the next converter
+  }
+  return holds ? 0 : 1;
 }
