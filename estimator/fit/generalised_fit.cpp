@@ -46,11 +46,15 @@ std::string undetermined_directions(const Eigen::MatrixXd& design, int rank) {
     ++named;
   };
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const std::string name = kAxisName[static_cast<std::size_t>(axis)];
+    const std::string scale = std::string("K_") + kAxisName[static_cast<std::size_t>(axis)];
+    const std::string force = std::string("a_") + kAxisName[static_cast<std::size_t>(axis)];
     if (design.col(axis).norm() < tolerance)
-      add("K_" + name + ": a_" + name + " is zero at every pose");
+      add(std::string(scale).append(": ").append(force).append(" is zero at every pose"));
     else if (spread(axis) < tolerance)
-      add("K_" + name + " cannot be told from U_0: a_" + name + " is the same at every pose");
+      add(std::string(scale)
+              .append(" cannot be told from U_0: ")
+              .append(force)
+              .append(" is the same at every pose"));
   }
   if (rank + named < 4) {
     const int open = 4 - rank - named;

@@ -131,7 +131,8 @@ NoisePool::Point NoisePool::maximise(const Eigen::Vector4d& start, unsigned free
         fixed + nonnegative_solution(now.normal, now.right - now.normal * fixed, free);
     Point next;
     bool better = false;
-    for (double step = 1; step > 1e-3 && !better; step *= 0.25) {
+    for (int quartering = 0; quartering < 5 && !better; ++quartering) {
+      const double step = std::ldexp(1.0, -2 * quartering);
       const Eigen::Vector4d candidate = now.power + step * (target - now.power);
       if (!(candidate(kTermQ) + candidate(kTermN) > 0)) continue;  // Σ would be singular
       next = evaluate(candidate);

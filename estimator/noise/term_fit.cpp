@@ -126,10 +126,10 @@ Maximum maximise(const std::vector<Bin>& bins, unsigned allowed, const Vector4& 
     const Likelihood here = spectrum_likelihood(bins, total);
     const Vector4 target =
         nonnegative_solution(here.normal, here.right - here.normal * fixed, allowed);
-    double step = 1;
+    constexpr int kHalvings = 14;
     Maximum next;
-    for (; step > 1e-4; step *= 0.5) {
-      next.power = now.power + step * (target - now.power);
+    for (int halving = 0; halving < kHalvings; ++halving) {
+      next.power = now.power + std::ldexp(1.0, -halving) * (target - now.power);
       const Vector4 candidate = next.power + fixed;
       if (!((candidate.array() * bins.back().density.array()).sum() > 0)) continue;
       next.deviance = deviance(bins, candidate);
@@ -182,8 +182,10 @@ std::vector<Description> describe(const std::vector<double>& c, double rate_hz) 
   constexpr unsigned kAll = (1U << kStochastic) - 1;
   const double duration_s = static_cast<double>(c.size()) / rate_hz;
   std::vector<Description> descriptions(1);
-  for (double time_s = 0.25 * duration_s; time_s * rate_hz > 10; time_s *= 0.5)
-    descriptions.emplace_back().decay_per_s = 1 / time_s;
+  // Correlation times by octaves, from a quarter of the record down to ten samples.
+  const int octaves = static_cast<int>(std::floor(std::log2(0.025 * duration_s * rate_hz)));
+  for (int octave = 0; octave <= octaves; ++octave)
+    descriptions.emplace_back().decay_per_s = std::ldexp(4 / duration_s, octave);
   for (Description& description : descriptions) {
     description.bins = make_bins(c, rate_hz, description.decay_per_s);
     description.best =
