@@ -65,7 +65,7 @@ tl::expected<std::vector<std::uint16_t>, ReplyFault> parse_read_reply(
   if (auto head = check_head(reply, unit, kReadHolding); !head) {
     return tl::unexpected(head.error());
   }
-  const auto expected = static_cast<std::size_t>(2 * count);
+  const auto expected = 2 * static_cast<std::size_t>(count);
   if (reply[2] != expected || reply.size() != 3 + expected) {
     return fault(fmt::format("reply of {} registers where {} were asked for", reply[2] / 2, count));
   }

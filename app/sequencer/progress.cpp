@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace plumbline::app {
 
@@ -19,7 +20,7 @@ double share(const Progress& progress) {
 std::string remaining(const Progress& progress, double elapsed_s) {
   const double done = share(progress);
   if (done < kPaceKnown) return "";
-  const auto left_s = static_cast<long>(elapsed_s * std::max(0.0, 1 - done) / done + 0.5);
+  const auto left_s = std::lround(elapsed_s * std::max(0.0, 1 - done) / done);
   return fmt::format("  {}:{:02} to go", left_s / 60, left_s % 60);
 }
 
