@@ -15,18 +15,21 @@ class CovariateEffect final : public Effect {
   std::string id() const override { return "covariate:" + column_; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"c", scale_ ? "1/unit" : "g/unit", ParameterRole::amplitude}};
+    return {{"c", scale_ ? "1/unit" : "g/unit", ParameterRole::amplitude},
+            {"mean", "unit", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    double largest = 0;
+    double mean = 0, largest = 0;
+    for (const Visit& visit : log.visits) mean += visit.covariate[index_];
+    mean /= static_cast<double>(log.visits.size());
     for (const Visit& visit : log.visits) {
-      largest = std::max(largest, std::abs(visit.covariate[index_]));
+      largest = std::max(largest, std::abs(visit.covariate[index_] - mean));
     }
     if (!(largest > 0)) return {};
-    return {{{effect::kSmallTerm / largest}}};
+    return {{{effect::kSmallTerm / largest, mean}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
-    const double value = p[0] * input.at().covariate[index_];
+    const double value = p[0] * (input.at().covariate[index_] - p[1]);
     return scale_ ? value * input.a() : value;
   }
 

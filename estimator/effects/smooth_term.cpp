@@ -80,15 +80,22 @@ std::vector<Driver> drivers_of(const VisitLog& log) {
   return drivers;
 }
 
+// Smallest and largest value over all visits and axes.
+std::pair<double, double> range(const Driver& driver, const VisitLog& log) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::size_t k = 0; k < log.visits.size(); ++k) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      low = std::min(low, driver.value(log, k, i));
+      high = std::max(high, driver.value(log, k, i));
+    }
+  }
+  return {low, high};
+}
+
 class SmoothFunction final : public SmoothTerm {
  public:
-  SmoothFunction(Driver driver, TermForm form, bool of_tilt, int degree, double low, double high)
-      : driver_(std::move(driver)),
-        form_(form),
-        of_tilt_(of_tilt),
-        degree_(degree),
-        low_(low),
-        high_(high) {}
+  SmoothFunction(Driver driver, TermForm form, bool of_tilt, int degree)
+      : driver_(std::move(driver)), form_(form), of_tilt_(of_tilt), degree_(degree) {}
 
   std::string id() const override {
     return "unlisted:" + driver_.name + ":" + to_string(form_) +
@@ -109,7 +116,8 @@ class SmoothFunction final : public SmoothTerm {
     const std::string unit = form_ == TermForm::geometry ? "deg"
                              : form_ == TermForm::scale  ? ""
                                                          : "g";
-    std::vector<ParameterInfo> infos;
+    std::vector<ParameterInfo> infos = {{"low", "", ParameterRole::index},
+                                        {"high", "", ParameterRole::index}};
     for (int d = 1; d <= degree_; ++d) {
       const std::string order = std::to_string(d);
       if (driver_.angle) {
@@ -121,9 +129,13 @@ class SmoothFunction final : public SmoothTerm {
     }
     return infos;
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    const auto [low, high] = range(driver_, log);
     const double size = form_ == TermForm::geometry ? effect::kSmallAngle_deg : effect::kSmallTerm;
-    return {{std::vector<double>(parameters().size(), size)}};
+    std::vector<double> p(parameters().size(), size);
+    p[0] = low;
+    p[1] = high;
+    return {{std::move(p)}};
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
@@ -140,13 +152,13 @@ class SmoothFunction final : public SmoothTerm {
     double sum = 0;
     if (driver_.angle) {
       for (int d = 1; d <= degree_; ++d) {
-        sum += p[2 * d - 2] * std::cos(d * v) + p[2 * d - 1] * std::sin(d * v);
+        sum += p[2 * d] * std::cos(d * v) + p[2 * d + 1] * std::sin(d * v);
       }
       return sum;
     }
-    const double x = std::clamp((2 * v - low_ - high_) / (high_ - low_), -1.0, 1.0);
+    const double x = std::clamp((2 * v - p[0] - p[1]) / (p[1] - p[0]), -1.0, 1.0);
     for (int d = 1; d <= degree_; ++d) {
-      sum += p[d - 1] * std::legendre(static_cast<unsigned>(d), x);
+      sum += p[d + 1] * std::legendre(static_cast<unsigned>(d), x);
     }
     return sum;
   }
@@ -155,7 +167,6 @@ class SmoothFunction final : public SmoothTerm {
   TermForm form_;
   bool of_tilt_;
   int degree_;
-  double low_, high_;
 };
 
 }  // namespace
@@ -163,17 +174,11 @@ class SmoothFunction final : public SmoothTerm {
 std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log) {
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   for (const Driver& driver : drivers_of(log)) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (std::size_t k = 0; k < log.visits.size(); ++k) {
-      for (std::size_t i = 0; i < kAxisCount; ++i) {
-        low = std::min(low, driver.value(log, k, i));
-        high = std::max(high, driver.value(log, k, i));
-      }
-    }
+    const auto [low, high] = range(driver, log);
     if (!(high > low)) continue;  // a variable that never varied drives nothing
     for (int degree : {1, 2, 3, 5}) {
       const auto add = [&](TermForm form, bool of_tilt) {
-        terms.push_back(std::make_unique<SmoothFunction>(driver, form, of_tilt, degree, low, high));
+        terms.push_back(std::make_unique<SmoothFunction>(driver, form, of_tilt, degree));
       };
       add(TermForm::bias, false);
       add(TermForm::scale, false);

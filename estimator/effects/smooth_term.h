@@ -15,8 +15,8 @@ enum class TermForm { bias, scale, geometry };
 const char* to_string(TermForm form);
 
 /// A polynomial (Legendre, degree 1 … d) or, for the spindle angle, a harmonic series (order
-/// 1 … d) in one variable. Not stateless like listed effects: it remembers the range in which the
-/// variable was seen, so that it means the same on another set; beyond that range it is held.
+/// 1 … d) in one variable. The range in which the variable was seen is part of its parameters, so
+/// that it means the same on another set; beyond that range it is held.
 class SmoothTerm : public Effect {
  public:
   virtual const std::string& driver() const = 0;  ///< "t_s", "rh_pct", "temp_C.rate" …

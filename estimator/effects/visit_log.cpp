@@ -85,12 +85,6 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     std::for_each(log.visits.begin(), turned,
                   [&](Visit& v) { v.delta_direction = turned->delta_direction; });
   }
-  for (std::size_t c = 0; c < log.covariate_names.size(); ++c) {
-    double mean = 0;
-    for (const Visit& visit : log.visits) mean += visit.covariate[c];
-    mean /= static_cast<double>(log.visits.size());
-    for (Visit& visit : log.visits) visit.covariate[c] -= mean;
-  }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     log.sample_sd_V[i] = white_sd(samples.u_V[i], set.poses);
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);

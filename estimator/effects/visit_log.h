@@ -21,7 +21,7 @@ struct Visit {
   double t_mean_s = 0;
   double temperature_K = 0;  ///< mean of T − T₀; 0 when not recorded
   int delta_direction = 0;   ///< sign of the last turn of δ that led here; 0 if δ never turned
-  std::vector<double> covariate;  ///< mean over the dwell, less the mean over the run
+  std::vector<double> covariate;  ///< mean over the dwell
 };
 
 /// The visits in order and what holds for all of them.
