@@ -159,7 +159,8 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
   if (!job.verification.poses.empty()) {
     const CertifiedModel model{.twelve = calibration.estimates.batch_ls,
                                .final = calibration.final.batch_ls,
-                               .effects = calibration.diagnosis.effects};
+                               .effects = calibration.diagnosis.effects,
+                               .unlisted = calibration.diagnosis.unlisted};
     outcome.verification = evaluate(model, job.verification, job.description);
   }
 

@@ -8,9 +8,11 @@
 #include <limits>
 
 #include "estimator/decision.h"
+#include "estimator/diagnosis/explain.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/error_figures.h"
+#include "estimator/fit/axis_tools.h"
 #include "estimator/fit/eight_state_filter.h"
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/fit/least_squares.h"
@@ -39,9 +41,10 @@ using TermCovariances = std::array<Eigen::MatrixXd, kTermCount>;
 
 /// One axis on its way through the engine.
 struct AxisWork {
-  NoiseModel noise;        ///< with the powers that the run, too, supports
-  TermCovariances unit;    ///< of the pose means, per noise term of coefficient 1
-  Eigen::VectorXd y;       ///< pose means, V
+  NoiseModel noise;      ///< with the powers that the run, too, supports
+  TermCovariances unit;  ///< of the pose means, per noise term of coefficient 1
+  Eigen::VectorXd y;     ///< pose means, V
+  Eigen::VectorXd positioning_V2;
   Eigen::VectorXd own_V2;  ///< variance that each pose has for itself: positioning and rounding
   GeneralisedFit fit;
   Eigen::MatrixXd V;
@@ -98,38 +101,20 @@ Eigen::MatrixXd pose_covariance_V2(const TermCovariances& unit, const NoisePower
   return V;
 }
 
-NoiseTerm term_of_power(double power) {
-  NoiseTerm term;
-  term.value = std::sqrt(std::max(power, 0.0));
-  term.present = power > 0;
-  return term;
-}
-
-/// The filter has to believe in the same noise as the batch fit, or their comparison says nothing.
-NoiseModel with_powers(NoiseModel noise, const NoisePowers& powers, double walk_decay_per_s) {
-  noise.walk_decay_per_s = walk_decay_per_s;
-  noise.Q = term_of_power(powers(kTermQ));
-  noise.N = term_of_power(powers(kTermN));
-  noise.B = term_of_power(powers(kTermB));
-  noise.K = term_of_power(powers(kTermK));
-  noise.R = term_of_power(powers(kTermR));
-  return noise;
-}
-
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
   AxisWork work;
   work.y = mean_voltages(experiment.poses, axis);
   const Eigen::Index n = work.y.size();
   const LeastSquaresResult ordinary = solve_least_squares(experiment.A, work.y);
-  const Eigen::VectorXd positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
-  work.own_V2 = positioning_V2.array() + shared_rounding_variance(identified);
+  work.positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
+  work.own_V2 = work.positioning_V2.array() + shared_rounding_variance(identified);
 
   NoisePowers powers = noise_powers(identified);
   double walk_decay_per_s = identified.walk_decay_per_s;
   if (n > 4 && powers.sum() > 0) {
     const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
     work.test = test_residual(identified, {work.y, experiment.A, a_g, experiment.windows,
-                                           positioning_V2, experiment.drivers});
+                                           work.positioning_V2, experiment.drivers});
     powers = work.test.noise.power;
     walk_decay_per_s = work.test.noise.walk_decay_per_s;
   }
@@ -149,36 +134,6 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   return work;
 }
 
-/// Adds what the fit cannot see: local gravity scales all of K alike. `inflation` is the Birge
-/// ratio squared.
-AxisEstimate with_gravity(AxisEstimate estimate, const Gravity& gravity, double inflation) {
-  estimate.covariance *= inflation;
-  const double relative = gravity.u_mps2 / gravity.local_mps2;
-  const Eigen::Vector3d K = estimate.value.head<3>();
-  estimate.covariance.topLeftCorner<3, 3>() += relative * relative * K * K.transpose();
-  return estimate;
-}
-
-/// Largest E_n = |x₁ − x₂| / √(U₁² + U₂²), U = 2u, of the four parameters (ISO/IEC 17043). Both
-/// estimates use the same data, so that E_n is far below 1 unless one of them is wrong.
-double largest_en(const AxisEstimate& first, const AxisEstimate& second) {
-  const Eigen::Vector4d U =
-      2.0 * (first.covariance.diagonal() + second.covariance.diagonal()).cwiseSqrt();
-  return (first.value - second.value).cwiseAbs().cwiseQuotient(U).maxCoeff();
-}
-
-EightStateOptions filter_options(const Experiment& experiment) {
-  EightStateOptions options;
-  const double first_s = experiment.poses.front().t_arrival_s;
-  const double duration_s = experiment.poses.back().t_mean_s - first_s;
-  const double spacing_s = duration_s / static_cast<double>(experiment.poses.size());
-  // The stand-in for flicker fits about a decade: it is put in the middle of the times that the
-  // run can tell apart. The ramp is one over the whole run.
-  options.flicker_correlation_s = std::sqrt(spacing_s * duration_s);
-  options.ramp_frequency_rad_s = 1.0 / duration_s;
-  return options;
-}
-
 /// Filter, recursive and batch estimates after each pose; the last ones are those of the run.
 void follow_convergence(const Experiment& experiment, const AxisWork& work, double inflation,
                         std::size_t axis, Convergence& convergence) {
@@ -190,7 +145,7 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
   const Eigen::VectorXd white_V2 = pose_covariance_V2(work.unit, white, work.own_V2).diagonal();
 
   RecursiveLeastSquares recursive(kPriorSd);
-  EightStateFilter filter(work.noise, filter_options(experiment),
+  EightStateFilter filter(work.noise, filter_options(experiment.poses),
                           experiment.poses.front().t_arrival_s);
   for (Eigen::Index row = 0; row < experiment.A.rows(); ++row) {
     const auto pose = static_cast<std::size_t>(row);
@@ -242,8 +197,7 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
   const MeasurementSet& run = experiment.input.run;
   errors.fit_pose_rms_mps2[axis] = rms(mps2_per_V * work.fit.residual_V);
   errors.sample_rms_mps2[axis] =
-      std::abs(mps2_per_V) *
-      sample_rms_V(run, experiment.input.description.gravity, work.fit.estimate, axis);
+      std::abs(mps2_per_V) * sample_rms_V(run, experiment.A * work.fit.estimate.value, axis);
   Eigen::VectorXd heldout(2 * work.y.size());
   heldout << heldout_residuals_V(experiment.A, work.y, work.V, time_blocks(experiment.poses)),
       heldout_residuals_V(experiment.A, work.y, work.V, position_blocks(experiment.poses));
@@ -255,7 +209,7 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
 
 }  // namespace
 
-Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /*options*/) {
+Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& options) {
   assert(input.run.has_angles && !input.run.poses.empty());
   Experiment experiment{input, pose_means(input.run), {}, {}, {}};
   experiment.A = design_matrix(experiment.poses, input.description.gravity);
@@ -339,6 +293,15 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& /
   result.final = result.estimates;
   result.final.rls.reset();
   result.after = result.before;
+  if (result.diagnosis.verdict != Verdict::undetermined) {
+    ExplainInput explain_input{input, experiment.poses, experiment.windows, result.noise, {}};
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      explain_input.positioning_V2[axis] = work[axis].positioning_V2;
+    if (const auto worst = explain(explain_input, options, result)) {
+      worst_error_mps2 = worst->error_mps2;
+      u_worst_mps2 = worst->u_mps2;
+    }
+  }
   if (input.description.limits && worst_error_mps2 >= 0)
     result.decision =
         decide(input.description.limits->max_abs_error_mps2, worst_error_mps2, u_worst_mps2);

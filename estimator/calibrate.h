@@ -59,6 +59,7 @@ struct UnlistedStructure {
   std::string form;  ///< bias, scale, geometry or sample
   std::vector<std::size_t> axes;
   std::string shape;
+  std::vector<EffectParameter> parameters;
   double p_value = 1;
   double heldout_gain = 0;
 };
@@ -174,6 +175,7 @@ struct CertifiedModel {
   TriadEstimate twelve;  ///< before any effect
   TriadEstimate final;   ///< together with the effects
   std::vector<FoundEffect> effects;
+  std::vector<UnlistedStructure> unlisted;
 };
 
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,

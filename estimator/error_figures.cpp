@@ -67,20 +67,20 @@ Blocks position_blocks(const std::vector<PoseMean>& poses) {
   return blocks;
 }
 
-double sample_rms_V(const MeasurementSet& set, const Gravity& gravity, const AxisEstimate& estimate,
+double sample_rms_V(const MeasurementSet& set, const Eigen::VectorXd& predicted_V,
                     std::size_t axis) {
-  const double gamma = gravity.local_mps2 / kStandardGravity_mps2;
-  const std::vector<double>& voltage_V = set.samples.u_V[axis];
+  assert(predicted_V.size() == std::ssize(set.poses));
   double sum = 0;
   double count = 0;
-  for (const Pose& pose : set.poses) {
-    const Eigen::Vector3d a_g = specific_force(pose.delta_deg, pose.h_deg, gamma).a_g;
-    const double model_V = estimate.value.head<3>().dot(a_g) + estimate.value(3);
-    for (std::size_t i = pose.first; i < pose.first + pose.count; ++i)
-      sum += (voltage_V[i] - model_V) * (voltage_V[i] - model_V);
+  for (std::size_t k = 0; k < set.poses.size(); ++k) {
+    const Pose& pose = set.poses[k];
+    for (std::size_t row = pose.first; row < pose.first + pose.count; ++row) {
+      const double error = set.samples.u_V[axis][row] - predicted_V(static_cast<Eigen::Index>(k));
+      sum += error * error;
+    }
     count += static_cast<double>(pose.count);
   }
-  return std::sqrt(sum / count);
+  return count > 0 ? std::sqrt(sum / count) : std::numeric_limits<double>::quiet_NaN();
 }
 
 double expected_mean_square_V2(const Eigen::MatrixXd& A, const Eigen::MatrixXd& gain,

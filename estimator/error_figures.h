@@ -28,8 +28,9 @@ Blocks time_blocks(const std::vector<PoseMean>& poses);
 /// Cells of 60° in δ by 30° in h: what depends on position must be predicted from elsewhere.
 Blocks position_blocks(const std::vector<PoseMean>& poses);
 
-/// Root mean square over all samples of one axis of voltage − K·a − U0, V.
-double sample_rms_V(const MeasurementSet& set, const Gravity& gravity, const AxisEstimate& estimate,
+/// Root mean square over all samples of one axis of voltage − predicted mean of their pose, V.
+/// predicted_V: one per pose.
+double sample_rms_V(const MeasurementSet& set, const Eigen::VectorXd& predicted_V,
                     std::size_t axis);
 
 /// Root mean square residual of n poses that a covariance V of the pose means leaves after the fit

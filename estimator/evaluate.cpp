@@ -1,7 +1,10 @@
 #include <Eigen/Core>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "estimator/calibrate.h"
+#include "estimator/diagnosis/explain.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/pose_means.h"
@@ -9,16 +12,16 @@
 namespace plumbline {
 namespace {
 
-EvaluationFigures figures(const TriadEstimate& model, const MeasurementSet& set,
-                          const std::vector<PoseMean>& poses, const Gravity& gravity) {
-  const Eigen::MatrixXd A = design_matrix(poses, gravity);
+/// Errors of predicted pose means, V, one vector of n poses per axis.
+EvaluationFigures figures(const TriadEstimate& model, const PerAxis<Eigen::VectorXd>& predicted_V,
+                          const MeasurementSet& set, const std::vector<PoseMean>& poses) {
   EvaluationFigures result;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const double factor = input_referred_mps2_per_V(model[axis], axis);
-    const Eigen::VectorXd error = factor * (mean_voltages(poses, axis) - A * model[axis].value);
+    const Eigen::VectorXd error = factor * (mean_voltages(poses, axis) - predicted_V[axis]);
     result.pose_rms_mps2[axis] = rms(error);
     result.pose_max_abs_mps2[axis] = max_abs(error);
-    result.sample_rms_mps2[axis] = std::abs(factor) * sample_rms_V(set, gravity, model[axis], axis);
+    result.sample_rms_mps2[axis] = std::abs(factor) * sample_rms_V(set, predicted_V[axis], axis);
   }
   return result;
 }
@@ -31,8 +34,17 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   Evaluation result;
   result.poses = poses.size();
   result.samples = set.samples.size();
-  result.before = figures(model.twelve, set, poses, description.gravity);
-  result.after = figures(model.final, set, poses, description.gravity);
+  const Eigen::MatrixXd A = design_matrix(poses, description.gravity);
+  PerAxis<Eigen::VectorXd> twelve_V;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    twelve_V[axis] = A * model.twelve[axis].value;
+  }
+  result.before = figures(model.twelve, twelve_V, set, poses);
+
+  const VisitLog log = make_visit_log(set, description);
+  std::vector<std::shared_ptr<const Effect>> owned;
+  const EnlargedParameters enlarged = restore_model(model, log, owned);
+  result.after = figures(model.final, predict_means_V(log, enlarged), set, poses);
   return result;
 }
 

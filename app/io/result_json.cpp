@@ -47,9 +47,9 @@ Json to_json(const NoiseModel& noise) {
           {"adequate", noise.adequate}};
 }
 
-Json to_json(const FoundEffect& effect) {
+Json json_parameters(const std::vector<EffectParameter>& reported) {
   Json parameters = Json::array();
-  for (const EffectParameter& parameter : effect.parameters) {
+  for (const EffectParameter& parameter : reported) {
     parameters.push_back(
         {{"name", parameter.name},
          {"axis", parameter.axis ? Json(kAxisName.at(*parameter.axis)) : Json(nullptr)},
@@ -57,9 +57,13 @@ Json to_json(const FoundEffect& effect) {
          {"u", json_number(parameter.u)},
          {"unit", parameter.unit}});
   }
+  return parameters;
+}
+
+Json to_json(const FoundEffect& effect) {
   return {{"id", effect.id},
           {"axes", json_axis_names(effect.axes)},
-          {"parameters", std::move(parameters)},
+          {"parameters", json_parameters(effect.parameters)},
           {"p_value", json_number(effect.p_value)},
           {"heldout_gain", json_number(effect.heldout_gain)},
           {"alternatives", effect.alternatives},
@@ -71,6 +75,7 @@ Json to_json(const UnlistedStructure& structure) {
           {"form", structure.form},
           {"axes", json_axis_names(structure.axes)},
           {"shape", structure.shape},
+          {"parameters", json_parameters(structure.parameters)},
           {"p_value", json_number(structure.p_value)},
           {"heldout_gain", json_number(structure.heldout_gain)}};
 }

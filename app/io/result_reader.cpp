@@ -43,20 +43,42 @@ TriadEstimate triad_estimate(const Json& json) {
   return triad;
 }
 
-FoundEffect found_effect(const Json& json) {
-  FoundEffect effect;
-  effect.id = json.at("id").get<std::string>();
-  for (const Json& axis : json.at("axes")) effect.axes.push_back(axis_named(axis));
-  for (const Json& item : json.at("parameters")) {
+std::vector<std::size_t> axes_named(const Json& names) {
+  std::vector<std::size_t> axes;
+  for (const Json& name : names) axes.push_back(axis_named(name));
+  return axes;
+}
+
+std::vector<EffectParameter> effect_parameters(const Json& items) {
+  std::vector<EffectParameter> parameters;
+  for (const Json& item : items) {
     EffectParameter parameter;
     parameter.name = item.at("name").get<std::string>();
     if (!item.at("axis").is_null()) parameter.axis = axis_named(item.at("axis"));
     parameter.value = item.at("value").get<double>();
     parameter.u = item.at("u").get<double>();
     parameter.unit = item.at("unit").get<std::string>();
-    effect.parameters.push_back(std::move(parameter));
+    parameters.push_back(std::move(parameter));
   }
+  return parameters;
+}
+
+FoundEffect found_effect(const Json& json) {
+  FoundEffect effect;
+  effect.id = json.at("id").get<std::string>();
+  effect.axes = axes_named(json.at("axes"));
+  effect.parameters = effect_parameters(json.at("parameters"));
   return effect;
+}
+
+UnlistedStructure unlisted_structure(const Json& json) {
+  UnlistedStructure structure;
+  structure.driver = json.at("driver").get<std::string>();
+  structure.form = json.at("form").get<std::string>();
+  structure.axes = axes_named(json.at("axes"));
+  structure.shape = json.at("shape").get<std::string>();
+  structure.parameters = effect_parameters(json.at("parameters"));
+  return structure;
 }
 
 StoredCalibration stored_calibration(const Json& json) {
@@ -69,6 +91,9 @@ StoredCalibration stored_calibration(const Json& json) {
   stored.model.final = triad_estimate(json.at("final").at("batch_ls"));
   for (const Json& effect : json.at("diagnosis").at("effects")) {
     stored.model.effects.push_back(found_effect(effect));
+  }
+  for (const Json& structure : json.at("diagnosis").at("unlisted")) {
+    stored.model.unlisted.push_back(unlisted_structure(structure));
   }
   const Json& dut = json.at("provenance").at("dut");
   stored.dut.serial = dut.at("serial").get<std::string>();

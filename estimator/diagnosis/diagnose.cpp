@@ -81,8 +81,7 @@ std::string describe(const FoundEffect& effect) {
   return text;
 }
 
-}  // namespace
-
+/// One entry per id, axes and parameters together.
 std::vector<FoundEffect> report_effects(const VisitLog& log, const EnlargedFit& fit) {
   std::vector<FoundEffect> found;
   for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
@@ -112,13 +111,12 @@ std::vector<FoundEffect> report_effects(const VisitLog& log, const EnlargedFit& 
   return found;
 }
 
-Diagnosed diagnose(const SearchInput& input, const SearchOptions& options) {
-  Diagnosed diagnosed;
-  diagnosed.candidates = all_candidates(input.log);
-  diagnosed.search = search_effects(input, diagnosed.candidates, options);
+}  // namespace
+
+void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
   const SearchResult& search = diagnosed.search;
   Diagnosis& diagnosis = diagnosed.diagnosis;
-
+  diagnosis = {};
   std::vector<FoundEffect> found = report_effects(input.log, search.fit);
   for (std::size_t e = 0; e < search.evidence.size(); ++e) {
     const Effect& effect = *search.evidence[e].candidate.effect;
@@ -126,6 +124,7 @@ Diagnosed diagnose(const SearchInput& input, const SearchOptions& options) {
     if (const auto* term = dynamic_cast<const SmoothTerm*>(&effect)) {
       diagnosis.unlisted.push_back({term->driver(), to_string(term->form()),
                                     axes_of(search.fit.parameters.effects[e]), term->shape(),
+                                    report_parameters(input.log, search.fit, e),
                                     search.evidence[e].p_value, 0});
       continue;
     }
@@ -137,23 +136,44 @@ Diagnosed diagnose(const SearchInput& input, const SearchOptions& options) {
   }
   std::erase_if(found, [](const FoundEffect& f) { return f.id.starts_with("unlisted:"); });
   diagnosis.effects = std::move(found);
-
-  if (diagnosis.effects.empty() && diagnosis.unlisted.empty()) {
-    diagnosis.verdict = Verdict::clean;
-    diagnosis.reason = "No effect stands out of the identified noise.";
-  } else {
-    diagnosis.verdict = diagnosis.effects.empty() ? Verdict::partly_explained : Verdict::explained;
-    for (const FoundEffect& effect : diagnosis.effects) {
-      diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ") + describe(effect);
-    }
-    for (const UnlistedStructure& u : diagnosis.unlisted) {
-      diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ");
-      diagnosis.reason += "a " + u.shape + " in " + u.driver + " changes the " + u.form;
-    }
-    diagnosis.reason += ".";
-  }
   diagnosis.p_value =
       search.evidence.empty() ? search.p_best_rest : search.evidence.front().p_value;
+  if (diagnosis.effects.empty() && diagnosis.unlisted.empty()) {
+    diagnosis.verdict = Verdict::clean;
+    diagnosis.reason = "no effect stands out of the identified noise";
+    return;
+  }
+  diagnosis.verdict = Verdict::explained;
+  for (const FoundEffect& effect : diagnosis.effects) {
+    diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ") + describe(effect);
+  }
+  for (const UnlistedStructure& unlisted : diagnosis.unlisted) {
+    diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ");
+    diagnosis.reason += "unlisted: a " + unlisted.shape + " in " + unlisted.driver +
+                        " changes the " + unlisted.form;
+  }
+}
+
+void attach_gains(Diagnosed& diagnosed, const std::vector<double>& gains) {
+  Diagnosis& diagnosis = diagnosed.diagnosis;
+  std::size_t unlisted = 0;
+  for (std::size_t e = 0; e < diagnosed.search.evidence.size() && e < gains.size(); ++e) {
+    const Effect& effect = *diagnosed.search.evidence[e].candidate.effect;
+    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
+      diagnosis.unlisted[unlisted++].heldout_gain = gains[e];
+      continue;
+    }
+    for (FoundEffect& entry : diagnosis.effects) {
+      if (entry.id == effect.id()) entry.heldout_gain = std::max(entry.heldout_gain, gains[e]);
+    }
+  }
+}
+
+Diagnosed diagnose(const SearchInput& input, const SearchOptions& options) {
+  Diagnosed diagnosed;
+  diagnosed.candidates = all_candidates(input.log);
+  diagnosed.search = search_effects(input, diagnosed.candidates, options);
+  describe_findings(input, diagnosed);
   return diagnosed;
 }
 

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "estimator/noise/chi_squared.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 
@@ -46,9 +47,10 @@ Eigen::MatrixXd independent_columns(const Eigen::MatrixXd& block) {
   return basis;
 }
 
-// Noise and parameters depend on each other weakly; two rounds settle both.
+// Noise and parameters depend on each other only weakly: one round after the parameters are known
+// settles both.
 Stage settle(const SearchInput& input, const EnlargedParameters& start, const Stage* previous) {
-  constexpr int kRounds = 2;
+  constexpr int kRounds = 1;
   Stage stage;
   stage.fit.parameters = start;
   if (previous != nullptr) {
@@ -59,14 +61,15 @@ Stage settle(const SearchInput& input, const EnlargedParameters& start, const St
     const auto predicted = predict_means_V(input.log, stage.fit.parameters);
     const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, stage.fit.parameters);
     const Eigen::Index n = predicted[0].size();
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
+    parallel_for(kAxisCount, [&](std::size_t i) {
       const Eigen::MatrixXd design =
           independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
-      stage.noise[i] = NoisePool(input.noise[i], input.windows, input.mean_V[i] - predicted[i],
-                                 design, input.extra_variance_V2[i])
-                           .pooled();
+      const Eigen::VectorXd residual = input.mean_V[i] - predicted[i];
+      stage.noise[i] =
+          best_pool(input.noise[i], input.windows, residual, design, input.extra_variance_V2[i])
+              .pooled();
       stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
-    }
+    });
     stage.fit = fit_enlarged(input.log, input.mean_V, stage.whitening, stage.fit.parameters);
   }
   return stage;

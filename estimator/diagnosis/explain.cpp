@@ -1,0 +1,243 @@
+#include "estimator/diagnosis/explain.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/diagnosis/diagnose.h"
+#include "estimator/diagnosis/heldout.h"
+#include "estimator/effects/catalogue.h"
+#include "estimator/effects/covariate.h"
+#include "estimator/effects/smooth_term.h"
+#include "estimator/error_figures.h"
+#include "estimator/fit/axis_tools.h"
+#include "estimator/noise/chi_squared.h"
+
+namespace plumbline {
+namespace {
+
+double mps2_per_V(const EnlargedParameters& model, std::size_t axis) {
+  return kStandardGravity_mps2 / model.twelve[axis](static_cast<Eigen::Index>(axis));
+}
+
+/// Held-out errors of both partitions, m/s², one vector of 2n per axis.
+PerAxis<Eigen::VectorXd> heldout_mps2(const ExplainInput& input, const SearchInput& search,
+                                      const PoseWhitening& whitening, const EnlargedFit& fit) {
+  const auto time =
+      heldout_residuals_V(search.log, search.mean_V, whitening, fit, time_blocks(input.poses));
+  const auto position =
+      heldout_residuals_V(search.log, search.mean_V, whitening, fit, position_blocks(input.poses));
+  PerAxis<Eigen::VectorXd> all;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    all[i].resize(2 * time[i].size());
+    all[i] << time[i], position[i];
+    all[i] *= mps2_per_V(fit.parameters, i);
+  }
+  return all;
+}
+
+double power(const PerAxis<Eigen::VectorXd>& errors, const std::vector<std::size_t>& axes) {
+  double sum = 0;
+  for (std::size_t axis : axes) sum += rms(errors[axis]) * rms(errors[axis]);
+  return sum;
+}
+
+/// Share of the excess held-out residual power that an effect removes.
+double heldout_gain(const PerAxis<Eigen::VectorXd>& without, const PerAxis<Eigen::VectorXd>& with,
+                    const PerAxis<double>& floor_mps2, const std::vector<std::size_t>& axes) {
+  double expected = 0;
+  for (std::size_t axis : axes) expected += floor_mps2[axis] * floor_mps2[axis];
+  const double before = power(without, axes), after = power(with, axes);
+  return (before - after) / std::max(before - expected, 1e-3 * before);
+}
+
+/// Four parameters of one axis out of the joint estimate.
+AxisEstimate axis_of(const EnlargedFit& fit, std::size_t axis) {
+  const auto at = 4 * static_cast<Eigen::Index>(axis);
+  return {fit.parameters.twelve[axis], fit.covariance.block<4, 4>(at, at)};
+}
+
+/// The filter on readings from which the effects are taken away.
+AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& search,
+                             const SearchResult& found, const Eigen::VectorXd& effect_V,
+                             std::size_t axis) {
+  const PooledNoise& pooled = found.noise[axis];
+  const NoiseModel noise = with_powers(search.noise[axis], pooled.power, pooled.walk_decay_per_s);
+  EightStateFilter filter(noise, filter_options(input.poses), input.poses.front().t_arrival_s);
+  for (std::size_t k = 0; k < input.poses.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    filter.predict(input.poses[k].t_mean_s);
+    const SampleWindow& window = input.windows[k];
+    const double duration_s = window.step_s * static_cast<double>(window.count);
+    const double variance_V2 =
+        pooled.power(kTermN) / duration_s + 2 * pooled.power(kTermQ) / (duration_s * duration_s) +
+        input.positioning_V2[axis](row) + shared_rounding_variance(search.noise[axis]);
+    const Visit& visit = search.log.visits[k];
+    filter.update(specific_force_g({visit.delta_rad, visit.h_rad}, search.log.gamma),
+                  search.mean_V[axis](row) - effect_V(row), variance_V2);
+  }
+  return filter.parameters();
+}
+
+/// Effects that do not help where they were not fitted are no effects.
+void drop_what_does_not_carry(const ExplainInput& input, const SearchInput& search,
+                              const PerAxis<double>& floor_mps2, SearchResult& found,
+                              std::vector<double>& gains) {
+  for (bool dropped = true; dropped && !found.evidence.empty();) {
+    dropped = false;
+    gains.clear();
+    const auto with = heldout_mps2(input, search, found.whitening, found.fit);
+    for (std::size_t k = 0; k < found.evidence.size(); ++k) {
+      EnlargedParameters fewer = found.fit.parameters;
+      const ActiveEffect removed = fewer.effects[k];
+      fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
+      EnlargedFit without = fit_enlarged(search.log, search.mean_V, found.whitening, fewer);
+      const double gain = heldout_gain(heldout_mps2(input, search, found.whitening, without), with,
+                                       floor_mps2, axes_of(removed));
+      // One pose's own error cannot be predicted from other poses.
+      const bool own = removed.effect->id() == "rig.pose_outlier";
+      if (gain > 0 || own) {
+        gains.push_back(std::max(gain, 0.0));
+        continue;
+      }
+      found.fit = std::move(without);
+      found.evidence.erase(found.evidence.begin() + static_cast<std::ptrdiff_t>(k));
+      dropped = true;
+      break;
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
+                                  Calibration& result) {
+  const VisitLog log = make_visit_log(input.input.run, input.input.description);
+  PerAxis<Eigen::VectorXd> mean_V;
+  EnlargedParameters start;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    mean_V[i] = mean_voltages(input.poses, i);
+    start.twelve[i] = result.estimates.batch_ls[i].value;
+  }
+  const SearchInput search{log, mean_V, input.noise, input.windows, input.positioning_V2, start};
+  SearchOptions search_options;
+  search_options.seed = options.seed;
+  Diagnosed diagnosed = diagnose(search, search_options);
+  SearchResult& found = diagnosed.search;
+  if (found.evidence.empty()) return std::nullopt;
+
+  std::vector<double> gains;
+  const std::size_t before_dropping = found.evidence.size();
+  drop_what_does_not_carry(input, search, result.floor_pose_rms_mps2, found, gains);
+  if (found.evidence.empty()) return std::nullopt;
+  if (found.evidence.size() != before_dropping) describe_findings(search, diagnosed);
+  attach_gains(diagnosed, gains);
+
+  const auto predicted_V = predict_means_V(log, found.fit.parameters);
+  const auto heldout = heldout_mps2(input, search, found.whitening, found.fit);
+  EnlargedParameters bare = found.fit.parameters;
+  bare.effects.clear();
+  const auto twelve_V = predict_means_V(log, bare);
+  const Gravity& gravity = input.input.description.gravity;
+
+  WorstError worst;
+  double chi2 = found.fit.chi2;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double factor = mps2_per_V(found.fit.parameters, i);
+    result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
+    result.final.ekf[i] = with_gravity(
+        filter_estimate(input, search, found, predicted_V[i] - twelve_V[i], i), gravity);
+    result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
+    const Eigen::VectorXd residual_mps2 = factor * (mean_V[i] - predicted_V[i]);
+    result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
+    result.after.heldout_pose_rms_mps2[i] = rms(heldout[i]);
+    result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout[i]);
+    result.after.sample_rms_mps2[i] =
+        std::abs(factor) * sample_rms_V(input.input.run, predicted_V[i], i);
+    for (Eigen::Index k = 0; k < residual_mps2.size(); ++k) {
+      result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[i] = residual_mps2(k);
+    }
+    if (result.after.heldout_pose_max_abs_mps2[i] > worst.error_mps2) {
+      worst.error_mps2 = result.after.heldout_pose_max_abs_mps2[i];
+      worst.u_mps2 = result.after.heldout_pose_rms_mps2[i];
+    }
+  }
+  // What is left against the noise that was re-estimated beside the effects.
+  const double dof = 3 * static_cast<double>(input.poses.size()) -
+                     static_cast<double>(found.fit.covariance.rows());
+  if (chi_squared_tail(chi2, dof) < 1e-4 && diagnosed.diagnosis.verdict == Verdict::explained) {
+    diagnosed.diagnosis.verdict = Verdict::partly_explained;
+  }
+  diagnosed.diagnosis.axis_test = result.diagnosis.axis_test;
+  result.diagnosis = std::move(diagnosed.diagnosis);
+  return worst;
+}
+
+namespace {
+
+/// Values of one axis's parameters by name; false when an index or shape is missing.
+bool fill(const Effect& effect, const std::vector<EffectParameter>& reported,
+          std::optional<std::size_t> axis, ActiveEffect& active) {
+  const auto infos = effect.parameters();
+  active.p.assign(infos.size(), 0);
+  active.free.assign(infos.size(), false);
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    const auto it = std::find_if(reported.begin(), reported.end(), [&](const EffectParameter& p) {
+      return p.name == infos[k].name && (!axis || p.axis == axis);
+    });
+    if (it != reported.end()) {
+      active.p[k] = it->value;
+    } else if (infos[k].role != ParameterRole::amplitude) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void restore(const Effect& effect, const std::vector<std::size_t>& axes,
+             const std::vector<EffectParameter>& reported, EnlargedParameters& model) {
+  if (!effect.carries_over()) return;
+  const bool head = effect.subject() == Subject::head;
+  for (std::size_t axis : head ? std::vector<std::size_t>{0} : axes) {
+    ActiveEffect active{&effect, axis, {}, {}};
+    if (fill(effect, reported, head ? std::nullopt : std::optional(axis), active)) {
+      model.effects.push_back(std::move(active));
+    }
+  }
+}
+
+}  // namespace
+
+EnlargedParameters restore_model(const CertifiedModel& model, const VisitLog& log,
+                                 std::vector<std::shared_ptr<const Effect>>& owned) {
+  EnlargedParameters restored;
+  for (std::size_t i = 0; i < kAxisCount; ++i) restored.twelve[i] = model.final[i].value;
+  for (auto& effect : covariate_effects(log)) owned.push_back(std::move(effect));
+  std::vector<std::shared_ptr<const SmoothTerm>> terms;
+  for (auto& term : smooth_terms(log)) {
+    terms.push_back(std::move(term));
+    owned.push_back(terms.back());
+  }
+  for (const FoundEffect& found : model.effects) {
+    for (const Effect* effect : effect_catalogue()) {
+      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, restored);
+    }
+    for (const auto& effect : owned) {
+      // Bias and scale form of a column share the id; the unit of c tells them apart.
+      if (effect->id() == found.id && !found.parameters.empty() &&
+          effect->parameters().front().unit == found.parameters.front().unit) {
+        restore(*effect, found.axes, found.parameters, restored);
+      }
+    }
+  }
+  for (const UnlistedStructure& found : model.unlisted) {
+    for (const auto& term : terms) {
+      if (term->driver() == found.driver && to_string(term->form()) == found.form &&
+          term->shape() == found.shape) {
+        restore(*term, found.axes, found.parameters, restored);
+      }
+    }
+  }
+  return restored;
+}
+
+}  // namespace plumbline

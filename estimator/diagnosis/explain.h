@@ -1,0 +1,39 @@
+// Closes the loop: what the diagnosis finds joins the model, and the calibration is done again.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "estimator/calibrate.h"
+#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/noise/covariance.h"
+#include "estimator/pose_means.h"
+
+namespace plumbline {
+
+struct ExplainInput {
+  const CalibrationInput& input;
+  const std::vector<PoseMean>& poses;
+  const std::vector<SampleWindow>& windows;
+  const PerAxis<NoiseModel>& noise;         ///< as identified
+  PerAxis<Eigen::VectorXd> positioning_V2;  ///< variance of each pose by the head's positioning
+};
+
+/// The largest error on left-out poses after effects were added.
+struct WorstError {
+  double error_mps2 = 0;
+  double u_mps2 = 0;
+};
+
+/// Searches the residual of a finished 12-parameter calibration. When effects are found and lower
+/// the error on left-out poses, fills diagnosis, final, after, floor and residual_after of `result`
+/// and returns the worst error; otherwise leaves `result` as it is.
+std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
+                                  Calibration& result);
+
+/// The enlarged model that reported effects stand for, on another set with its own log. `owned`
+/// keeps what exists for that set only alive. What belonged to one run is left out.
+EnlargedParameters restore_model(const CertifiedModel& model, const VisitLog& log,
+                                 std::vector<std::shared_ptr<const Effect>>& owned);
+
+}  // namespace plumbline
