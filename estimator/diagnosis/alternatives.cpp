@@ -100,8 +100,13 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
   std::vector<Candidate> sum;
   EnlargedFit fit = without;
   while (sum.size() < kLongestSum) {
-    const CandidateDirections next(input.log, list, result.whitening, fit);
-    const auto order = best_of_families(list, next, next.gains(fit.whitened_residual).col(0));
+    // A sum whose first members leave most of it open is not worth the search.
+    if (!sum.empty() && without.chi2 - fit.chi2 < 0.8 * found_gain) break;
+    std::vector<Rival> order = ranked;
+    if (!sum.empty()) {
+      const CandidateDirections next(input.log, list, result.whitening, fit);
+      order = best_of_families(list, next, next.gains(fit.whitened_residual).col(0));
+    }
     const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {
       const Candidate& candidate = list.candidates[r.candidate];
       return usable(candidate) &&

@@ -7,6 +7,7 @@
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 
@@ -51,18 +52,38 @@ CandidateList all_candidates(const VisitLog& log) {
 
 namespace {
 
-// What the mean readings of all axes change by when `active` joins the model, V, 3n rows.
-Eigen::VectorXd response(const VisitLog& log, const EnlargedParameters& model,
-                         const PerAxis<Eigen::VectorXd>& without, const ActiveEffect& active) {
-  EnlargedParameters with = model;
-  with.effects.push_back(active);
-  const auto predicted = predict_means_V(log, with);
-  const Eigen::Index n = without[0].size();
-  Eigen::VectorXd change(3 * n);
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    change.segment(static_cast<Eigen::Index>(i) * n, n) = predicted[i] - without[i];
+/// The model as it stands, evaluated once for all candidates.
+struct Baseline {
+  const VisitLog& log;
+  const EnlargedParameters& model;
+  PerAxis<Eigen::VectorXd> mean_V;
+  std::vector<Eigen::Vector3d> a_g;  ///< with the geometry of the model's effects
+};
+
+// What the mean readings of all axes change by when `active` joins the model, V, 3n rows. A sensor
+// effect adds its term to one axis; a head effect moves everything.
+void add_response(const Baseline& base, const ActiveEffect& active,
+                  Eigen::Ref<Eigen::VectorXd> change) {
+  const Eigen::Index n = base.mean_V[0].size();
+  if (active.effect->subject() == Subject::sensor) {
+    const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
+    const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
+    const Eigen::Index at = static_cast<Eigen::Index>(active.axis) * n;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const auto visit = static_cast<std::size_t>(k);
+      const double response_V = twelve.head<3>().dot(base.a_g[visit]);
+      const TermInput input{
+          base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+      change(at + k) = K_ii * active.effect->term_g(input, active.p.data());
+    }
+    return;
   }
-  return change;
+  EnlargedParameters with = base.model;
+  with.effects.push_back(active);
+  const auto predicted = predict_means_V(base.log, with);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    change.segment(static_cast<Eigen::Index>(i) * n, n) = predicted[i] - base.mean_V[i];
+  }
 }
 
 }  // namespace
@@ -77,33 +98,38 @@ CandidateDirections::CandidateDirections(const VisitLog& log, const CandidateLis
     model_basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(rows, scaled.cols());
   }
   // One column for each amplitude; an effect of shapes alone is one column as it stands.
-  std::vector<Eigen::VectorXd> columns;
+  std::vector<ActiveEffect> singles;
   std::vector<std::size_t> owner;
-  const auto without = predict_means_V(log, fit.parameters);
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
     const Candidate& candidate = list.candidates[c];
     const auto infos = candidate.effect->parameters();
-    ActiveEffect active = candidate.active();
+    const ActiveEffect active = candidate.active();
     std::vector<std::size_t> amplitudes;
     for (std::size_t k = 0; k < infos.size(); ++k) {
       if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0) amplitudes.push_back(k);
     }
     if (amplitudes.empty()) {
-      columns.push_back(response(log, fit.parameters, without, active));
+      singles.push_back(active);
       owner.push_back(c);
     }
     for (std::size_t amplitude : amplitudes) {
-      ActiveEffect single = active;
-      for (std::size_t other : amplitudes) {
-        if (other != amplitude) single.p[other] = 0;
-      }
-      columns.push_back(response(log, fit.parameters, without, single));
+      singles.push_back(active);
       owner.push_back(c);
+      for (std::size_t other : amplitudes) {
+        if (other != amplitude) singles.back().p[other] = 0;
+      }
     }
   }
-  Eigen::MatrixXd all(rows, static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t j = 0; j < columns.size(); ++j)
-    all.col(static_cast<Eigen::Index>(j)) = columns[j];
+  const Baseline base{log, fit.parameters, predict_means_V(log, fit.parameters),
+                      specific_forces_g(log, fit.parameters)};
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(rows, std::ssize(singles));
+  constexpr std::size_t kChunk = 64;
+  parallel_for((singles.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(singles.size(), (chunk + 1) * kChunk);
+    for (std::size_t j = chunk * kChunk; j < end; ++j) {
+      add_response(base, singles[j], all.col(static_cast<Eigen::Index>(j)));
+    }
+  });
   all = whitening.apply(all);
   const Eigen::VectorXd before = all.colwise().norm();
   all = project(all);

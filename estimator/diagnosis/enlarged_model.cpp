@@ -72,11 +72,10 @@ void EnlargedParameters::set_free_values(const Eigen::VectorXd& values) {
   }
 }
 
-PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
-                                         const EnlargedParameters& parameters) {
-  const std::size_t n = log.visits.size();
-  std::vector<Eigen::Vector3d> a_g(n);
-  for (std::size_t k = 0; k < n; ++k) {
+std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
+                                               const EnlargedParameters& parameters) {
+  std::vector<Eigen::Vector3d> a_g(log.visits.size());
+  for (std::size_t k = 0; k < a_g.size(); ++k) {
     HeadGeometry head{log.visits[k].delta_rad, log.visits[k].h_rad};
     for (const ActiveEffect& active : parameters.effects) {
       if (active.effect->subject() == Subject::head) {
@@ -85,6 +84,13 @@ PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
     }
     a_g[k] = specific_force_g(head, log.gamma);
   }
+  return a_g;
+}
+
+PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
+                                         const EnlargedParameters& parameters) {
+  const std::size_t n = log.visits.size();
+  const std::vector<Eigen::Vector3d> a_g = specific_forces_g(log, parameters);
   PerAxis<Eigen::VectorXd> mean_V;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const Eigen::Vector4d& twelve = parameters.twelve[i];

@@ -34,6 +34,10 @@ struct EnlargedParameters {
   void set_free_values(const Eigen::VectorXd& values);
 };
 
+/// Specific force at every visit with the geometry of the model's head effects, standard g.
+std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
+                                               const EnlargedParameters& parameters);
+
 /// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
 

@@ -15,7 +15,7 @@ namespace plumbline {
 struct SearchOptions {
   std::uint64_t seed = 1;
   double false_alarm = 0.003;  ///< chance that noise alone makes the search claim an effect
-  int replicates = 400;        ///< of simulated noise, for the look-elsewhere correction
+  int replicates = 150;        ///< of simulated noise, for the look-elsewhere correction
   std::size_t max_effects = 6;
 };
 

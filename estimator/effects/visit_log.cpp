@@ -69,7 +69,9 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
       visit.temperature_K = mean_of(samples.temp_C, pose) - description.reference_C;
     }
     if (!log.visits.empty()) {
-      const double turn = visit.delta_rad - log.visits.back().delta_rad;
+      // The shorter way round.
+      const double turn =
+          std::remainder(visit.delta_rad - log.visits.back().delta_rad, 2 * std::numbers::pi);
       if (turn != 0) direction = turn > 0 ? 1 : -1;
     }
     visit.delta_direction = direction;
