@@ -47,7 +47,7 @@ double heldout_gain(const PerAxis<Eigen::VectorXd>& without, const PerAxis<Eigen
   double expected = 0;
   for (std::size_t axis : axes) expected += floor_mps2[axis] * floor_mps2[axis];
   const double before = power(without, axes), after = power(with, axes);
-  return (before - after) / std::max(before - expected, 1e-3 * before);
+  return (before - after) / std::max({before - expected, before - after, 1e-12 * before});
 }
 
 /// Four parameters of one axis out of the joint estimate.
@@ -168,6 +168,11 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     diagnosed.diagnosis.verdict = Verdict::partly_explained;
   }
   diagnosed.diagnosis.axis_test = result.diagnosis.axis_test;
+  // How large the residual was, then what it comes from.
+  if (result.diagnosis.verdict == Verdict::unexplained) {
+    diagnosed.diagnosis.reason =
+        result.diagnosis.reason + "; explained by " + diagnosed.diagnosis.reason;
+  }
   result.diagnosis = std::move(diagnosed.diagnosis);
   return worst;
 }

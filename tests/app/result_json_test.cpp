@@ -53,6 +53,7 @@ Calibration some_calibration() {
                                      .form = "bias",
                                      .axes = {0, 2},
                                      .shape = "rises",
+                                     .parameters = {{"p1", 0, 0.001, 0.0001, "g"}},
                                      .p_value = 0.001,
                                      .heldout_gain = 0.5}};
   calibration.decision = {.status = DecisionStatus::conditional_pass,

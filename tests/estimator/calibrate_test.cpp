@@ -72,10 +72,18 @@ TEST(Calibrate, SaysWhenTheModelLacksSomething) {
   options.h_step_deg = 10;
   options.k2_x_V_per_g2 = 0.032 * 0.05;
   const Calibration result = calibrated(synthetic_run(3, kSixteenBits, options));
-  EXPECT_EQ(result.diagnosis.verdict, Verdict::unexplained);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::explained);
   EXPECT_THAT(result.diagnosis.reason, HasSubstr("x axis: residual"));
   EXPECT_LT(result.diagnosis.p_value, 1e-6);
-  EXPECT_THAT(result.diagnosis.effects, testing::IsEmpty());
+  ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
+  const FoundEffect& effect = result.diagnosis.effects[0];
+  EXPECT_EQ(effect.id, "sensor.quadratic");
+  EXPECT_THAT(effect.axes, testing::ElementsAre(0u));
+  ASSERT_EQ(effect.parameters.size(), 1u);
+  EXPECT_NEAR(effect.parameters[0].value, 0.05, 4 * effect.parameters[0].u);
+  EXPECT_LT(effect.parameters[0].u, 0.005);
+  EXPECT_GT(effect.heldout_gain, 0.9);
+  EXPECT_LT(result.after.heldout_pose_rms_mps2[0], 0.3 * result.before.heldout_pose_rms_mps2[0]);
 }
 
 TEST(Calibrate, NoiseFromTheBurstsWhenThereIsNoStaticRecord) {

@@ -1,0 +1,169 @@
+// One walk over all effects: what holds for each of them, whatever it is.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <set>
+
+#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/effects/catalogue.h"
+#include "estimator/effects/covariate.h"
+#include "estimator/kinematics.h"
+
+namespace plumbline {
+namespace {
+
+// 12 × 5 positions visited in a snake, with a temperature and a humidity that move.
+VisitLog example_log() {
+  MeasurementSet set;
+  set.samples.covariates.push_back({"rh_pct", {}});
+  RunDescription description;
+  description.gravity.local_mps2 = 9.81;
+  description.adc = Adc{16, -5, 0};
+  for (int k = 0; k < 60; ++k) {
+    const int ring = k / 12, step = ring % 2 == 0 ? k % 12 : 11 - k % 12;
+    set.poses.push_back({k, 30.0 * step, 20.0 * ring, set.samples.size(), 8});
+    for (int i = 0; i < 8; ++i) {
+      const double t_s = 6.0 * k + 0.01 * i;
+      set.samples.t_s.push_back(t_s);
+      for (auto& u : set.samples.u_V) u.push_back(-2.5 + 0.03 * std::sin(0.3 * k) + 1e-4 * (i % 3));
+      set.samples.temp_C.push_back(21 + 2 * std::sin(t_s / 100));
+      set.samples.covariates[0].value.push_back(45 + std::cos(t_s / 70));
+    }
+  }
+  return make_visit_log(set, description);
+}
+
+EnlargedParameters twelve() {
+  EnlargedParameters parameters;
+  parameters.twelve = {Eigen::Vector4d(0.032, -0.0017, 0.0001, -2.58),
+                       Eigen::Vector4d(0.0022, 0.0314, 0.0002, -2.44),
+                       Eigen::Vector4d(-0.0003, -0.0017, -0.0328, -2.34)};
+  return parameters;
+}
+
+double largest_change(const VisitLog& log, const ActiveEffect& active) {
+  EnlargedParameters with = twelve();
+  with.effects.push_back(active);
+  const auto before = predict_means_V(log, twelve()), after = predict_means_V(log, with);
+  double largest = 0;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    largest = std::max(largest, (after[i] - before[i]).cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+struct EveryEffect : testing::Test {
+  VisitLog log = example_log();
+  std::vector<std::unique_ptr<Effect>> columns = covariate_effects(log);
+  std::vector<const Effect*> all = effect_catalogue();
+  EveryEffect() {
+    for (const auto& effect : columns) all.push_back(effect.get());
+  }
+};
+
+TEST_F(EveryEffect, HasAnIdOfItsOwnAndNamedParameters) {
+  std::set<std::string> ids;
+  for (const Effect* effect : effect_catalogue()) {
+    EXPECT_TRUE(ids.insert(effect->id()).second) << effect->id();
+    std::set<std::string> names;
+    for (const ParameterInfo& info : effect->parameters()) {
+      EXPECT_TRUE(names.insert(info.name).second) << effect->id() << " " << info.name;
+    }
+    EXPECT_FALSE(names.empty()) << effect->id();
+  }
+  EXPECT_EQ(ids.size(), 30u);  // FORMATS lists so many beside recorded columns
+}
+
+TEST_F(EveryEffect, DoesNothingAtZeroAmplitudeAndSomethingOtherwise) {
+  for (const Effect* effect : all) {
+    const auto infos = effect->parameters();
+    for (std::size_t axis = 0; axis < (effect->subject() == Subject::head ? 1u : 3u); ++axis) {
+      double most = 0;
+      const auto hypotheses = effect->hypotheses(log, axis);
+      for (const Hypothesis& hypothesis : hypotheses) {
+        ActiveEffect active = activate(*effect, axis, hypothesis);
+        most = std::max(most, largest_change(log, active));
+        bool has_amplitude = false;
+        for (std::size_t k = 0; k < infos.size(); ++k) {
+          if (infos[k].role != ParameterRole::amplitude) continue;
+          active.p[k] = 0;
+          has_amplitude = true;
+        }
+        if (has_amplitude) {
+          EXPECT_EQ(largest_change(log, active), 0) << effect->id();
+        }
+      }
+      if (!hypotheses.empty()) {
+        EXPECT_GT(most, 1e-9) << effect->id() << " on " << kAxisName[axis];
+      }
+    }
+  }
+}
+
+TEST_F(EveryEffect, JacobianAgreesWithTheChangeThatAStepMakes) {
+  for (const Effect* effect : all) {
+    const auto hypotheses = effect->hypotheses(log, 0);
+    if (hypotheses.empty()) continue;
+    const auto infos = effect->parameters();
+    EnlargedParameters model = twelve();
+    model.effects.push_back(activate(*effect, 0, hypotheses[hypotheses.size() / 2]));
+    const Eigen::MatrixXd jacobian = prediction_jacobian(log, model);
+    Eigen::Index column = 12;
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!model.effects[0].free[k]) continue;
+      // Amplitudes act nearly linearly: doubling adds about the derivative times the amplitude.
+      if (infos[k].role == ParameterRole::amplitude) {
+        EnlargedParameters doubled = model;
+        doubled.effects[0].p[k] *= 2;
+        const auto from = predict_means_V(log, model), to = predict_means_V(log, doubled);
+        Eigen::VectorXd change(jacobian.rows());
+        change << to[0] - from[0], to[1] - from[1], to[2] - from[2];
+        const Eigen::VectorXd expected = model.effects[0].p[k] * jacobian.col(column);
+        EXPECT_LT((change - expected).norm(), 0.02 * expected.norm() + 1e-12)
+            << effect->id() << " " << infos[k].name;
+      }
+      ++column;
+    }
+  }
+}
+
+TEST(Kinematics, BothFormsAgreeAndErrorsTiltByHand) {
+  constexpr double kDeg = std::numbers::pi / 180;
+  for (double delta : {0.0, 40.0, 215.0}) {
+    for (double h : {0.0, 30.0, 80.0}) {
+      const Eigen::Vector3d a = specific_force_g({delta * kDeg, h * kDeg}, 1.001);
+      EXPECT_LT((a - specific_force(delta, h, 1.001).a_g).norm(), 1e-14);
+    }
+  }
+  // At δ = h = 0 y_s = −y_b: a base rolled by +ε about x_b lifts y_b, so y_s reads −sin ε.
+  const Eigen::Vector3d rolled = specific_force_g({0, 0, 0.1, 0}, 1);
+  EXPECT_NEAR(rolled.x(), std::cos(0.1), 1e-15);
+  EXPECT_NEAR(rolled.y(), -std::sin(0.1), 1e-15);
+  EXPECT_NEAR(rolled.z(), 0, 1e-15);
+  // Skew shows only when the spindle is raised: a_x += sin δ·sin η·sin h.
+  const Eigen::Vector3d skewed = specific_force_g({90 * kDeg, 30 * kDeg, 0, 0.1}, 1);
+  EXPECT_NEAR(skewed.x(), std::sin(0.1) * 0.5, 1e-15);
+  EXPECT_NEAR(skewed.z(), std::cos(0.1) * 0.5, 1e-15);
+}
+
+TEST(VisitLog, ApproachesByTheShorterWayRound) {
+  MeasurementSet set;
+  for (int k = 0; k < 4; ++k) {
+    const double delta_deg[] = {340, 350, 10, 300};
+    set.poses.push_back({k, delta_deg[k], 0, set.samples.size(), 1});
+    set.samples.t_s.push_back(k);
+    for (auto& u : set.samples.u_V) u.push_back(0.1 * k);
+  }
+  const VisitLog log = make_visit_log(set, {});
+  EXPECT_EQ(log.visits[0].delta_direction, 1);  // like the first turn
+  EXPECT_EQ(log.visits[1].delta_direction, 1);
+  EXPECT_EQ(log.visits[2].delta_direction, 1);
+  EXPECT_EQ(log.visits[3].delta_direction, -1);
+}
+
+}  // namespace
+}  // namespace plumbline
