@@ -139,6 +139,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const auto twelve_V = predict_means_V(log, bare);
   const Gravity& gravity = input.input.description.gravity;
 
+  const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
+  const auto n = std::ssize(input.poses);
   WorstError worst;
   double chi2 = found.fit.chi2;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -149,6 +151,17 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
     const Eigen::VectorXd residual_mps2 = factor * (mean_V[i] - predicted_V[i]);
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
+    // The noise estimated beside the effects, not the one that had to take them up.
+    const auto block = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
+    const Eigen::MatrixXd lower = found.whitening.lower[i].triangularView<Eigen::Lower>();
+    const double expected_V2 = (lower.rowwise().squaredNorm().sum() -
+                                (block * found.fit.covariance).cwiseProduct(block).sum()) /
+                               static_cast<double>(n);
+    const double floor_mps2 = std::abs(factor) * std::sqrt(std::max(expected_V2, 0.0));
+    if (result.floor_pose_rms_mps2[i] > 0) {
+      result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
+    }
+    result.floor_pose_rms_mps2[i] = floor_mps2;
     result.after.heldout_pose_rms_mps2[i] = rms(heldout[i]);
     result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout[i]);
     result.after.sample_rms_mps2[i] =
