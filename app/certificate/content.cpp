@@ -45,7 +45,11 @@ std::string status_words(DecisionStatus status) {
 /// A reason as it stands in a certificate: capital letter, full stop.
 std::string sentence(std::string text) {
   if (text.empty()) return text;
-  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  // An effect's id at the beginning stays as it is written.
+  const std::size_t word = text.find(' ');
+  if (text.substr(0, word).find('.') == std::string::npos) {
+    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  }
   if (text.back() != '.') text += '.';
   return text;
 }

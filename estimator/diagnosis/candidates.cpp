@@ -52,6 +52,16 @@ CandidateList all_candidates(const VisitLog& log) {
 
 namespace {
 
+/// work(first, count) for blocks of neighbouring columns, on all cores.
+template <class Work>
+void for_column_blocks(Eigen::Index columns, const Work& work) {
+  constexpr Eigen::Index kBlock = 128;
+  parallel_for(static_cast<std::size_t>((columns + kBlock - 1) / kBlock), [&](std::size_t block) {
+    const Eigen::Index first = static_cast<Eigen::Index>(block) * kBlock;
+    work(first, std::min(kBlock, columns - first));
+  });
+}
+
 /// The model as it stands, evaluated once for all candidates.
 struct Baseline {
   const VisitLog& log;
@@ -123,14 +133,12 @@ CandidateDirections::CandidateDirections(const VisitLog& log, const CandidateLis
   const Baseline base{log, fit.parameters, predict_means_V(log, fit.parameters),
                       specific_forces_g(log, fit.parameters)};
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(rows, std::ssize(singles));
-  constexpr std::size_t kChunk = 64;
-  parallel_for((singles.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(singles.size(), (chunk + 1) * kChunk);
-    for (std::size_t j = chunk * kChunk; j < end; ++j) {
-      add_response(base, singles[j], all.col(static_cast<Eigen::Index>(j)));
+  for_column_blocks(all.cols(), [&](Eigen::Index first, Eigen::Index count) {
+    for (Eigen::Index j = first; j < first + count; ++j) {
+      add_response(base, singles[static_cast<std::size_t>(j)], all.col(j));
     }
+    all.middleCols(first, count) = whitening.apply(all.middleCols(first, count));
   });
-  all = whitening.apply(all);
   const Eigen::VectorXd before = all.colwise().norm();
   all = project(all);
 
@@ -155,11 +163,20 @@ CandidateDirections::CandidateDirections(const VisitLog& log, const CandidateLis
 }
 
 Eigen::MatrixXd CandidateDirections::project(const Eigen::MatrixXd& whitened) const {
-  return whitened - model_basis_ * (model_basis_.transpose() * whitened);
+  Eigen::MatrixXd projected(whitened.rows(), whitened.cols());
+  for_column_blocks(whitened.cols(), [&](Eigen::Index first, Eigen::Index count) {
+    const auto block = whitened.middleCols(first, count);
+    projected.middleCols(first, count) = block - model_basis_ * (model_basis_.transpose() * block);
+  });
+  return projected;
 }
 
 Eigen::MatrixXd CandidateDirections::gains(const Eigen::MatrixXd& whitened) const {
-  const Eigen::MatrixXd squares = (basis_.transpose() * whitened).cwiseAbs2();
+  Eigen::MatrixXd squares(basis_.cols(), whitened.cols());
+  for_column_blocks(basis_.cols(), [&](Eigen::Index first, Eigen::Index count) {
+    squares.middleRows(first, count) =
+        (basis_.middleCols(first, count).transpose() * whitened).cwiseAbs2();
+  });
   Eigen::MatrixXd gain =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(dof_.size()), whitened.cols());
   for (std::size_t c = 0; c < dof_.size(); ++c) {

@@ -4,6 +4,8 @@
 #include <Eigen/QR>
 #include <limits>
 
+#include "estimator/parallel_for.h"
+
 namespace plumbline {
 
 PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
@@ -16,7 +18,7 @@ PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, fit.parameters);
   PerAxis<Eigen::MatrixXd> inverse, weighted_jacobian;
   PerAxis<Eigen::VectorXd> residual, weighted_residual, heldout;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
+  parallel_for(kAxisCount, [&](std::size_t i) {
     const Eigen::MatrixXd half =
         whitening.lower[i].triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
     inverse[i] = half.transpose() * half;
@@ -24,7 +26,7 @@ PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
     weighted_residual[i] = inverse[i] * residual[i];
     weighted_jacobian[i] = inverse[i] * jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     heldout[i] = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
-  }
+  });
   for (const std::vector<Eigen::Index>& block : blocks) {
     // A free parameter for every reading of the block is the same as leaving it out.
     const Eigen::Index size = std::ssize(block);
