@@ -42,7 +42,7 @@ struct EffectParameter {
   std::string unit;
 };
 
-/// An effect that the 12-parameter model lacks and the data show (FORMATS section 6).
+/// An effect that the 12-parameter model lacks and the data show.
 struct FoundEffect {
   std::string id;
   std::vector<std::size_t> axes;

@@ -21,11 +21,10 @@ struct HeadStatus {
   HeadAngles actual;  ///< encoder readings
   bool in_position =
       false;  ///< both axes, confirmed by target echo and sequence echo of the last command
-  bool moving = false;  ///< any axis
-  bool ready = false;   ///< both axes enabled, ready and without alarm
-  bool homed = false;   ///< both axes
-  std::array<std::uint16_t, 2>
-      alarm{};  ///< alarm code per axis (δ, h), 0 = none; RIG.md lists them
+  bool moving = false;                   ///< any axis
+  bool ready = false;                    ///< both axes enabled, ready and without alarm
+  bool homed = false;                    ///< both axes
+  std::array<std::uint16_t, 2> alarm{};  ///< alarm code per axis (δ, h), 0 = none; see alarm_text()
   std::array<double, 2> drive_temp_C{};
 };
 

@@ -18,7 +18,7 @@
 namespace plumbline::rig {
 
 /// [head]: how the drive is reached and how its registers are laid out.
-/// The defaults are those of the simulated rig (design: RIG.md's register map).
+/// The defaults are those of the simulated rig.
 struct HeadConfig {
   std::string modbus;                             ///< "tcp:HOST:PORT" or "rtu:DEVICE,115200,8E1"
   std::array<int, 2> unit_id = {1, 1};            ///< of δ and h

@@ -75,7 +75,7 @@ TEST_F(EveryEffect, HasAnIdOfItsOwnAndNamedParameters) {
     }
     EXPECT_FALSE(names.empty()) << effect->id();
   }
-  EXPECT_EQ(ids.size(), 30u);  // FORMATS lists so many beside recorded columns
+  EXPECT_EQ(ids.size(), 30u);  // all that result.json may name, recorded columns aside
 }
 
 TEST_F(EveryEffect, DoesNothingAtZeroAmplitudeAndSomethingOtherwise) {
