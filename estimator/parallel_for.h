@@ -9,6 +9,23 @@
 
 namespace plumbline {
 
+/// As long as one lives, parallel_for() of its thread starts no others: for programs that work on
+/// several runs at once.
+class SerialScope {
+ public:
+  SerialScope() { ++depth(); }
+  ~SerialScope() { --depth(); }
+  SerialScope(const SerialScope&) = delete;
+  SerialScope& operator=(const SerialScope&) = delete;
+  static bool active() { return depth() > 0; }
+
+ private:
+  static int& depth() {
+    static thread_local int value = 0;
+    return value;
+  }
+};
+
 /// Calls work(i) for i = 0 … count − 1 on all cores and returns when all are done. Results must go
 /// to places of their own, so that they do not depend on the number of threads. `work` must not
 /// throw.
@@ -18,7 +35,8 @@ void parallel_for(std::size_t count, const Work& work) {
   const auto run = [&] {
     for (std::size_t i = next++; i < count; i = next++) work(i);
   };
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t cores =
+      SerialScope::active() ? 1 : std::max(1U, std::thread::hardware_concurrency());
   std::vector<std::jthread> helpers;
   for (std::size_t i = 1; i < std::min(count, cores); ++i) helpers.emplace_back(run);
   run();

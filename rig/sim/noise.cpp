@@ -45,6 +45,10 @@ ChannelNoise::ChannelNoise(const NoiseTerms& terms, double rate_hz, std::uint64_
       corner_hz /= kCornerRatio;
     }
   }
+  if (terms.relaxation > 0) {
+    for (const double tau_s : terms.relaxation_tau_s)
+      flicker_.emplace_back(terms.relaxation, tau_s, slow_);
+  }
   ramp_V_per_s_ = slow_.sign() * terms.R;
 }
 

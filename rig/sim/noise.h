@@ -43,7 +43,7 @@ class ChannelNoise {
   double rate_hz_;
   Random white_;
   Random slow_;
-  std::vector<Wander> flicker_;  ///< corner frequencies a factor 4 apart
+  std::vector<Wander> flicker_;  ///< corner frequencies a factor 4 apart, then the relaxations
   double rounding_ = 0;          ///< last error of the integrator behind quantization noise, in Q
   double random_walk_V_ = 0;
   double ramp_V_per_s_ = 0;

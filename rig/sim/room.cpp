@@ -19,7 +19,9 @@ RoomProcess::RoomProcess(const Room& room, std::uint64_t seed)
       reading_(seed, "room.reading"),
       air_(room.wander_C, room.wander_tau_s, random_),
       humidity_(room.rh_wander_pct, room.rh_wander_tau_s, random_),
-      supply_(room.supply_wander_V, room.supply_wander_tau_s, random_) {}
+      supply_(room.supply_wander_V, room.supply_wander_tau_s, random_),
+      motor_random_(seed, "room.motor"),
+      motor_(room.motor_wander_A, room.motor_wander_tau_s, motor_random_) {}
 
 RoomState RoomProcess::next(double t_s, double dt_s, double h_deg, bool moving) {
   RoomState state;
@@ -37,9 +39,10 @@ RoomState RoomProcess::next(double t_s, double dt_s, double h_deg, bool moving) 
   state.rh_pct = room_.rh_pct + cycle(room_.rh_cycle_pct, t_s, room_.rh_cycle_period_s) +
                  humidity_.next(dt_s, random_);
   state.motor_A = room_.hold_A + (moving ? room_.move_A : 0.0) +
-                  room_.lift_A * std::cos(h_deg * std::numbers::pi / 180);
-  state.supply_V =
-      room_.supply_V + supply_.next(dt_s, random_) - room_.supply_drop_V_per_A * state.motor_A;
+                  room_.lift_A * std::cos(h_deg * std::numbers::pi / 180) +
+                  motor_.next(dt_s, motor_random_);
+  state.supply_V = room_.supply_V + cycle(room_.supply_cycle_V, t_s, room_.supply_cycle_period_s) +
+                   supply_.next(dt_s, random_) - room_.supply_drop_V_per_A * state.motor_A;
   return state;
 }
 

@@ -33,6 +33,8 @@ class RoomProcess {
   Wander air_;
   Wander humidity_;
   Wander supply_;
+  Random motor_random_;
+  Wander motor_;
   double lagged_C_ = 0;
   bool started_ = false;
 };

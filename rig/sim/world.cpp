@@ -67,6 +67,9 @@ void read_noise_terms(StrictTable table, double volts_per_g, NoiseTerms& terms) 
   read("B", terms.B);
   read("K", terms.K);
   read("R", terms.R);
+  read("relaxation", terms.relaxation);
+  terms.relaxation_tau_s =
+      table.numbers_or("relaxation_tau_s", terms.relaxation_tau_s, 0, kPositive);
 }
 
 void read_noise(StrictTable table, World& world) {
@@ -106,11 +109,15 @@ void read_room(StrictTable table, Room& room) {
   any("supply_V", room.supply_V);
   size("supply_wander_V", room.supply_wander_V);
   time("supply_wander_tau_s", room.supply_wander_tau_s);
+  any("supply_cycle_V", room.supply_cycle_V);
+  time("supply_cycle_period_s", room.supply_cycle_period_s);
   any("supply_drop_V_per_A", room.supply_drop_V_per_A);
   size("supply_noise_V", room.supply_noise_V);
   size("hold_A", room.hold_A);
   size("lift_A", room.lift_A);
   size("move_A", room.move_A);
+  size("motor_wander_A", room.motor_wander_A);
+  time("motor_wander_tau_s", room.motor_wander_tau_s);
   size("motor_noise_A", room.motor_noise_A);
 }
 

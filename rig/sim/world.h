@@ -45,6 +45,10 @@ struct NoiseTerms {
       0;  ///< bias instability, V: PSD (B²/2π)/f between kFlickerLowest_hz (noise.h) and rate/4
   double K = 0;  ///< acceleration random walk, V/√s
   double R = 0;  ///< ramp, V/s: a straight line of slope ±R, sign drawn from the seed
+  /// Relaxations (first-order Gauss-Markov processes), one for each time constant, each with this
+  /// standard deviation in V: flicker noise of a limited band, as real devices have it.
+  double relaxation = 0;
+  std::vector<double> relaxation_tau_s = {};
 };
 
 /// The room and what it does to the sensor's temperature; the columns recorded beside the outputs.
@@ -72,12 +76,16 @@ struct Room {
   double supply_V = 5;
   double supply_wander_V = 0;
   double supply_wander_tau_s = 300;
+  double supply_cycle_V = 0;  ///< amplitude of a sinusoidal cycle
+  double supply_cycle_period_s = 800;
   double supply_drop_V_per_A = 0;  ///< drop under the motors' current
   double supply_noise_V = 0.0001;  ///< of one reading
 
-  double hold_A = 0.2;          ///< motor current at rest
-  double lift_A = 0.15;         ///< added at rest by the torque of the raised arm, times cos h
-  double move_A = 0.5;          ///< added while an axis moves
+  double hold_A = 0.2;        ///< motor current at rest
+  double lift_A = 0.15;       ///< added at rest by the torque of the raised arm, times cos h
+  double move_A = 0.5;        ///< added while an axis moves
+  double motor_wander_A = 0;  ///< load that changes with time
+  double motor_wander_tau_s = 60;
   double motor_noise_A = 0.04;  ///< of one reading
 };
 

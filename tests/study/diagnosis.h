@@ -1,0 +1,164 @@
+// Does the diagnosis name what is there, and nothing else? Simulated sets with known effects,
+// calibrated one after another and scored against the truth.
+//
+// Size of an effect: with the readings of the same unit with and without it (no noise, no rounding,
+// but for effects of the converter), the change of the pose means is freed of what the 12
+// parameters take up (ordinary least squares), and its RMS over the poses is divided by the RMS
+// that noise alone leaves on that axis. The axis where this is largest counts; the amplitude is
+// scaled until it is `size`. adc.mains_pickup averages out in the means: there the RMS over all
+// samples of the change is divided by the same pose noise.
+//
+// Oracle: the same unit, head, room, noise and seed without the effect, fitted by generalised least
+// squares under the true covariance, scored on the same left-out blocks and fresh poses.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "estimator/calibrate.h"
+#include "estimator/measurement.h"
+#include "rig/sim/random.h"
+#include "rig/sim/record.h"
+#include "rig/sim/world.h"
+
+namespace plumbline::study {
+
+// --- what is simulated ---------------------------------------------------------------------------
+
+/// Noise of the outputs, and with it the timing of the poses.
+enum class NoiseKind {
+  white,     ///< nearly white; moves at the drive's speed, 1 s of settling
+  examples,  ///< white, relaxations over five decades, weak random walk; a pose every 6.4 s
+  coloured,  ///< relaxations and a random walk larger than the white noise of a pose
+};
+const char* to_string(NoiseKind kind);
+const char* to_string(sim::RecordOrder order);
+
+/// One set: everything random in it follows from `seed` and the values below.
+struct SetDesign {
+  std::uint64_t seed = 1;
+  std::vector<std::string> effects = {};  ///< names of study_effects()
+  double size = 3;                        ///< of every effect, in noise of a pose
+  sim::RecordOrder order = sim::RecordOrder::snake;
+  NoiseKind noise = NoiseKind::examples;
+  int bits = 16;
+  int samples_per_pose = 40;
+  double static_s = 300;
+};
+
+/// What the parameters of an effect may depend on.
+struct DrawContext {
+  sim::Random& random;
+  const sim::World& world;
+  std::size_t axis;
+  double run_s;    ///< length of the run
+  double dwell_s;  ///< length of a pose
+};
+using DrawParameters = std::function<std::map<std::string, double>(const DrawContext&)>;
+
+/// An effect that the study can add to a set.
+struct StudyEffect {
+  const char* name;  ///< id of the simulated effect; `:bias` or `:scale` appended to a column
+  const char* axes;  ///< those of which one is drawn, "xyz"; "" for the head: no choice
+  double largest;    ///< amplitude beyond which a size cannot be had with this design
+  /// Names that say the same thing.
+  std::vector<std::string> synonyms;
+  /// Drivers that count as right, for effects outside the list; empty for listed ones.
+  std::vector<std::string> drivers;
+  /// Parameters for an amplitude of 1; those named in `scaled` are multiplied by the amplitude.
+  DrawParameters draw;
+  std::vector<std::string> scaled;
+};
+const std::vector<StudyEffect>& study_effects();
+/// nullptr when there is none of that name.
+const StudyEffect* find_study_effect(const std::string& name);
+/// Names of all listed effects (true) or all outside the list (false), in the order of the table.
+std::vector<std::string> effect_names(bool listed);
+
+/// The unit, its noise and its room for a design, without effects.
+sim::World study_world(const SetDesign& design);
+
+/// A set with its truth and the same set without effects.
+struct StudySet {
+  sim::World world;           ///< with the effects, scaled
+  sim::RecordedSet set;       ///< run and verification
+  sim::RecordedSet plain;     ///< the same without effects
+  SampleTable static_record;  ///< another day: own clock, own noise, same unit and effects
+  PerAxis<Eigen::MatrixXd> covariance_V2;   ///< n × n, true, of the pose means of the run
+  PerAxis<double> noise_mps2{};             ///< RMS that noise alone leaves after an ordinary fit
+  std::vector<sim::EffectSetting> effects;  ///< as world.effects
+  std::vector<double> size;                 ///< reached, one per effect
+  std::vector<double> sigma;  ///< √(Δχ²) each would gain under the true noise: its detectability
+  bool feasible = true;       ///< every effect could be scaled to the size
+};
+StudySet make_set(const SetDesign& design);
+
+// --- how it is scored ----------------------------------------------------------------------------
+
+/// RMS over poses and axes, m/s².
+struct Errors {
+  double fresh = 0;    ///< on the verification poses
+  double heldout = 0;  ///< on left-out blocks of time and of position
+};
+
+struct SetOutcome {
+  SetDesign design;
+  bool feasible = true;
+  std::string truth;  ///< effects as simulated, in words
+  std::vector<double> size;
+  std::vector<double> sigma;
+  std::string found;  ///< what was reported, in words
+  Verdict verdict = Verdict::undetermined;
+  double p_value = 1;
+  double heldout_gain = 0;  ///< of the best finding
+
+  int effects = 0;          ///< true ones
+  int named = 0;            ///< id and axes right
+  int named_or_stated = 0;  ///< these, and those among the stated alternatives of a finding
+  int wrong = 0;            ///< findings, listed or unlisted, that stand for no true effect
+  int unlisted = 0;         ///< of the findings
+  int driver_right = 0;     ///< true effects outside the list found under a right driver
+  int listed_instead = 0;   ///< listed names claimed where only effects outside the list are
+
+  int missed() const { return effects - named_or_stated - driver_right; }
+  /// Findings beyond those that stand for, or in place of, a true effect.
+  int additional() const { return std::max(0, wrong - missed()); }
+
+  int parameters = 0, parameters_within = 0;  ///< of named effects, within ±1.96·u
+  int K_within = 0, U0_within = 0;            ///< of 9 and 3, of the certified model
+  double worst_K = 0, worst_U0 = 0;           ///< largest |error|/u
+
+  Errors before, after, oracle;
+  double plain_oracle_fresh = 0;  ///< ordinary least squares without the effect
+  double seconds = 0;             ///< of calibrate()
+};
+
+SetOutcome run_set(const SetDesign& design);
+/// Scores a calibration of a set; run_set() is make_set(), calibrate() and this.
+SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration& calibration);
+
+/// Writes the set as files that the command line program reads.
+Result<void> dump(const StudySet& set, const std::string& folder);
+
+// --- tables --------------------------------------------------------------------------------------
+
+/// 95 % limits of a share, k out of n (Wilson, 1927).
+struct Share {
+  int k = 0;
+  int n = 0;
+  double value() const { return n > 0 ? static_cast<double>(k) / n : 0; }
+  double lower() const;
+  double upper() const;
+};
+std::string csv_header();
+/// One line; its last column is the command line that makes the same set again.
+std::string csv_row(const SetOutcome& outcome);
+/// One block of lines: what the issue asks for, over the given sets.
+std::string summary(const std::vector<SetOutcome>& outcomes, double detectable_sigma);
+
+}  // namespace plumbline::study

@@ -1,0 +1,295 @@
+// Scores calibrations of the study's sets against their truth.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <cmath>
+
+#include "estimator/error_figures.h"
+#include "estimator/fit/generalised_fit.h"
+#include "estimator/fit/least_squares.h"
+#include "estimator/pose_means.h"
+#include "tests/study/diagnosis.h"
+
+namespace plumbline::study {
+namespace {
+
+constexpr double kCoverage = 1.96;  // of a 95 % interval, in u
+
+double over_axes(const PerAxis<double>& rms_mps2) {
+  double sum = 0;
+  for (const double value : rms_mps2) sum += value * value;
+  return std::sqrt(sum / kAxisCount);
+}
+
+std::string axes_text(const std::vector<std::size_t>& axes) {
+  std::string text;
+  for (const std::size_t axis : axes) text += kAxisName[axis];
+  return text;
+}
+
+bool is_head(const std::string& id) { return id.starts_with("rig."); }
+
+/// `bias` or `scale` of a recorded column, told by the unit of its coefficient.
+std::string form_of(const FoundEffect& found) {
+  if (found.parameters.empty()) return "";
+  return found.parameters.front().unit.starts_with("g") ? "bias" : "scale";
+}
+
+bool same_id(const sim::EffectSetting& truth, const FoundEffect& found) {
+  if (truth.id != found.id) return false;
+  return !truth.id.starts_with("covariate:") || truth.form == form_of(found);
+}
+
+bool same_axes(const sim::EffectSetting& truth, const FoundEffect& found) {
+  return is_head(truth.id) || truth.axes == found.axes;
+}
+
+bool covers_axes(const sim::EffectSetting& truth, const std::vector<std::size_t>& axes) {
+  return is_head(truth.id) || std::all_of(truth.axes.begin(), truth.axes.end(), [&](std::size_t a) {
+           return std::find(axes.begin(), axes.end(), a) != axes.end();
+         });
+}
+
+/// True when `id` is one of the alternatives, or a term of one that is a sum.
+bool states(const FoundEffect& found, const std::string& id) {
+  return std::any_of(found.alternatives.begin(), found.alternatives.end(),
+                     [&](const std::string& alternative) {
+                       return ("+" + alternative + "+").find("+" + id + "+") != std::string::npos;
+                     });
+}
+
+/// Which true effect each finding stands for, and the other way round.
+void match(const std::vector<sim::EffectSetting>& truth, const Diagnosis& diagnosis,
+           SetOutcome& outcome) {
+  std::vector<bool> used(diagnosis.effects.size(), false);
+  std::vector<bool> settled(truth.size(), false);
+  for (std::size_t t = 0; t < truth.size(); ++t) {
+    for (std::size_t f = 0; f < used.size(); ++f) {
+      const FoundEffect& found = diagnosis.effects[f];
+      if (used[f] || !same_id(truth[t], found) || !covers_axes(truth[t], found.axes)) continue;
+      used[f] = settled[t] = true;
+      ++outcome.named_or_stated;
+      if (same_axes(truth[t], found)) {
+        ++outcome.named;
+      } else {
+        ++outcome.wrong;  // a further axis is a further claim
+      }
+      break;
+    }
+  }
+  // A finding may state several true effects as one sum.
+  for (std::size_t f = 0; f < used.size(); ++f) {
+    bool stands_for_one = used[f];
+    for (std::size_t t = 0; t < truth.size(); ++t) {
+      const FoundEffect& found = diagnosis.effects[f];
+      if (settled[t] || !states(found, truth[t].id)) continue;
+      if (!is_head(found.id) && !covers_axes(truth[t], found.axes)) continue;
+      settled[t] = stands_for_one = true;
+      ++outcome.named_or_stated;
+    }
+    if (!stands_for_one) ++outcome.wrong;
+  }
+  outcome.unlisted = static_cast<int>(diagnosis.unlisted.size());
+}
+
+/// Drivers of effects outside the list.
+void match_drivers(const SetDesign& design, const Diagnosis& diagnosis, SetOutcome& outcome) {
+  bool any_listed = false;
+  for (const std::string& name : design.effects) {
+    const StudyEffect* effect = find_study_effect(name);
+    assert(effect != nullptr);
+    if (effect->drivers.empty()) {
+      any_listed = true;
+      continue;
+    }
+    const bool right = std::any_of(
+        diagnosis.unlisted.begin(), diagnosis.unlisted.end(), [&](const UnlistedStructure& found) {
+          return std::find(effect->drivers.begin(), effect->drivers.end(), found.driver) !=
+                 effect->drivers.end();
+        });
+    outcome.driver_right += right ? 1 : 0;
+  }
+  if (!any_listed && !design.effects.empty())
+    outcome.listed_instead = static_cast<int>(diagnosis.effects.size());
+  outcome.wrong += std::max(0, outcome.unlisted - outcome.driver_right);
+}
+
+void check_parameters(const std::vector<sim::EffectSetting>& truth, const Diagnosis& diagnosis,
+                      SetOutcome& outcome) {
+  for (const sim::EffectSetting& effect : truth) {
+    for (const FoundEffect& found : diagnosis.effects) {
+      if (!same_id(effect, found) || !same_axes(effect, found)) continue;
+      for (const EffectParameter& p : found.parameters) {
+        const auto value = effect.parameters.find(p.name);
+        if (value == effect.parameters.end() || !(p.u > 0) || p.name == "mean") continue;
+        ++outcome.parameters;
+        outcome.parameters_within += std::abs(p.value - value->second) <= kCoverage * p.u ? 1 : 0;
+      }
+    }
+  }
+}
+
+/// Mean of a recorded column over the run, which the estimator refers a column's effect to.
+double column_mean(const SampleTable& samples, const std::string& column) {
+  for (const Covariate& covariate : samples.covariates) {
+    if (covariate.name != column) continue;
+    double sum = 0;
+    for (const double value : covariate.value) sum += value;
+    return sum / static_cast<double>(covariate.value.size());
+  }
+  return 0;
+}
+
+/// The 12 parameters in the estimator's convention: columns act about their mean over the run.
+PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
+  PerAxis<Eigen::Vector4d> truth;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto& K = set.world.triad.K_V_per_g[i];
+    truth[i] << K[0], K[1], K[2], set.world.triad.U0_V[i];
+  }
+  const sim::Room& room = set.world.room;
+  const std::map<std::string, double> nominal = {{"rh_pct", room.rh_pct},
+                                                 {"supply_V", room.supply_V},
+                                                 {"motor_A", room.hold_A + room.lift_A / 2}};
+  for (const sim::EffectSetting& effect : set.effects) {
+    if (!effect.id.starts_with("covariate:")) continue;
+    const std::string column = effect.id.substr(effect.id.find(':') + 1);
+    const auto found = nominal.find(column);
+    if (found == nominal.end()) continue;
+    const double shift =
+        effect.parameters.at("c") * (column_mean(set.set.run.samples, column) - found->second);
+    for (const std::size_t i : effect.axes) {
+      const auto own = static_cast<Eigen::Index>(i);
+      truth[i](effect.form == "scale" ? own : 3) += shift * set.world.triad.K_V_per_g[i][i];
+    }
+  }
+  return truth;
+}
+
+void check_twelve(const StudySet& set, const Calibration& calibration, SetOutcome& outcome) {
+  const PerAxis<Eigen::Vector4d> truth = true_twelve(set);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisEstimate& estimate = calibration.final.batch_ls[i];
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      const double z =
+          std::abs(estimate.value(k) - truth[i](k)) / std::sqrt(estimate.covariance(k, k));
+      (k < 3 ? outcome.K_within : outcome.U0_within) += z <= kCoverage ? 1 : 0;
+      double& worst = k < 3 ? outcome.worst_K : outcome.worst_U0;
+      worst = std::max(worst, z);
+    }
+  }
+}
+
+void score_oracle(const StudySet& set, SetOutcome& outcome) {
+  const auto poses = pose_means(set.plain.run);
+  const auto fresh = pose_means(set.plain.verification);
+  const Eigen::MatrixXd A = design_matrix(poses, set.plain.description.gravity);
+  const Eigen::MatrixXd A_fresh = design_matrix(fresh, set.plain.description.gravity);
+  PerAxis<double> fresh_mps2{};
+  PerAxis<double> heldout_mps2{};
+  PerAxis<double> ordinary_mps2{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const Eigen::VectorXd y = mean_voltages(poses, i);
+    const auto fit = fit_generalised(A, y, set.covariance_V2[i]);
+    assert(fit);
+    const double factor = input_referred_mps2_per_V(fit->estimate, i);
+    fresh_mps2[i] = rms(factor * (mean_voltages(fresh, i) - A_fresh * fit->estimate.value));
+    const Eigen::VectorXd ordinary = solve_least_squares(A, y).x;
+    ordinary_mps2[i] = rms(factor * (mean_voltages(fresh, i) - A_fresh * ordinary));
+    Eigen::VectorXd heldout(2 * y.size());
+    heldout << heldout_residuals_V(A, y, set.covariance_V2[i], time_blocks(poses)),
+        heldout_residuals_V(A, y, set.covariance_V2[i], position_blocks(poses));
+    heldout_mps2[i] = rms(factor * heldout);
+  }
+  outcome.oracle = {over_axes(fresh_mps2), over_axes(heldout_mps2)};
+  outcome.plain_oracle_fresh = over_axes(ordinary_mps2);
+}
+
+std::string describe_truth(const std::vector<sim::EffectSetting>& effects) {
+  std::string text;
+  for (const sim::EffectSetting& effect : effects) {
+    text += (text.empty() ? "" : "; ") + effect.id;
+    if (effect.id.starts_with("covariate:")) text += ":" + effect.form;
+    if (!is_head(effect.id)) text += "(" + axes_text(effect.axes) + ")";
+    for (const auto& [name, value] : effect.parameters)
+      text += fmt::format(" {}={:.6g}", name, value);
+    for (const long long pose : effect.poses) text += fmt::format(" #{}", pose);
+  }
+  return text;
+}
+
+std::string describe_found(const Diagnosis& diagnosis) {
+  std::string text;
+  for (const FoundEffect& effect : diagnosis.effects) {
+    text += fmt::format("{}{}({})", text.empty() ? "" : "; ", effect.id, axes_text(effect.axes));
+    for (const EffectParameter& p : effect.parameters)
+      text += fmt::format(" {}={:.5g}±{:.2g}", p.name, p.value, p.u);
+    if (!effect.alternatives.empty())
+      text += fmt::format(" [{}]", fmt::join(effect.alternatives, " | "));
+  }
+  for (const UnlistedStructure& found : diagnosis.unlisted) {
+    text += fmt::format("{}unlisted:{}:{}({}) {}", text.empty() ? "" : "; ", found.driver,
+                        found.form, axes_text(found.axes), found.shape);
+  }
+  return text;
+}
+
+}  // namespace
+
+SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration& calibration) {
+  SetOutcome outcome;
+  outcome.design = design;
+  outcome.feasible = set.feasible;
+  outcome.truth = describe_truth(set.effects);
+  outcome.size = set.size;
+  outcome.sigma = set.sigma;
+  outcome.found = describe_found(calibration.diagnosis);
+  outcome.verdict = calibration.diagnosis.verdict;
+  outcome.p_value = calibration.diagnosis.p_value;
+  for (const FoundEffect& effect : calibration.diagnosis.effects)
+    outcome.heldout_gain = std::max(outcome.heldout_gain, effect.heldout_gain);
+  for (const UnlistedStructure& found : calibration.diagnosis.unlisted)
+    outcome.heldout_gain = std::max(outcome.heldout_gain, found.heldout_gain);
+
+  outcome.effects = static_cast<int>(set.effects.size());
+  match(set.effects, calibration.diagnosis, outcome);
+  match_drivers(design, calibration.diagnosis, outcome);
+  check_parameters(set.effects, calibration.diagnosis, outcome);
+  check_twelve(set, calibration, outcome);
+  score_oracle(set, outcome);
+
+  const CertifiedModel model{calibration.estimates.batch_ls, calibration.final.batch_ls,
+                             calibration.diagnosis.effects, calibration.diagnosis.unlisted};
+  const Evaluation fresh = evaluate(model, set.set.verification, set.set.description);
+  outcome.before = {over_axes(fresh.before.pose_rms_mps2),
+                    over_axes(calibration.before.heldout_pose_rms_mps2)};
+  outcome.after = {over_axes(fresh.after.pose_rms_mps2),
+                   over_axes(calibration.after.heldout_pose_rms_mps2)};
+  return outcome;
+}
+
+SetOutcome run_set(const SetDesign& design) {
+  const StudySet set = make_set(design);
+  if (!set.feasible) {
+    SetOutcome outcome;
+    outcome.design = design;
+    outcome.feasible = false;
+    outcome.truth = describe_truth(set.effects);
+    outcome.size = set.size;
+    outcome.sigma = set.sigma;
+    outcome.effects = static_cast<int>(set.effects.size());
+    return outcome;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Calibration calibration =
+      calibrate({set.set.run, &set.static_record, set.set.description}, {design.seed});
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  SetOutcome outcome = score(design, set, calibration);
+  outcome.seconds = seconds;
+  return outcome;
+}
+
+}  // namespace plumbline::study

@@ -1,0 +1,157 @@
+// The study of the diagnosis on few sets; the whole one is scripts/study-diagnosis.
+#include "tests/study/diagnosis.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace plumbline::study {
+namespace {
+
+TEST(DiagnosisStudy, NamesAnEffectAndSaysNothingOnACleanSet) {
+  SetDesign design{.seed = 11, .effects = {"sensor.quadratic"}, .size = 3};
+  const SetOutcome with = run_set(design);
+  ASSERT_TRUE(with.feasible);
+  EXPECT_EQ(with.verdict, Verdict::explained);
+  EXPECT_EQ(with.named_or_stated, 1) << with.truth << " / " << with.found;
+  EXPECT_EQ(with.wrong, 0) << with.found;
+  EXPECT_LT(with.after.fresh, 0.8 * with.before.fresh);
+  EXPECT_LT(with.after.heldout, 1.15 * with.oracle.heldout);
+  EXPECT_NEAR(with.size.front(), 3, 0.06);
+
+  design.effects.clear();
+  const SetOutcome without = run_set(design);
+  EXPECT_EQ(without.verdict, Verdict::clean) << without.found;
+  EXPECT_EQ(without.wrong, 0) << without.found;
+  EXPECT_LT(without.after.heldout, 1.15 * without.oracle.heldout);
+}
+
+// The covariance that the oracle uses is the one that the simulated noise has.
+TEST(DiagnosisStudy, TrueCovariancePredictsTheResidualOfPlainSets) {
+  for (const NoiseKind kind : {NoiseKind::white, NoiseKind::examples, NoiseKind::coloured}) {
+    for (const int bits : {12, 16}) {
+      double ratio = 0;
+      constexpr int kSets = 8;
+      for (int k = 0; k < kSets; ++k) {
+        const StudySet set = make_set({.seed = static_cast<std::uint64_t>(100 + k),
+                                       .noise = kind,
+                                       .bits = bits,
+                                       .static_s = 1});
+        for (std::size_t i = 0; i < kAxisCount; ++i) {
+          ratio += std::pow(set.plain.truth.poses.oracle[i] / set.noise_mps2[i], 2) /
+                   (kSets * kAxisCount);
+        }
+      }
+      EXPECT_NEAR(ratio, 1, kind == NoiseKind::coloured ? 0.3 : 0.15)
+          << to_string(kind) << " " << bits;
+    }
+  }
+}
+
+TEST(DiagnosisStudy, EveryEffectReachesItsSize) {
+  for (const StudyEffect& effect : study_effects()) {
+    const SetDesign design{.seed = 5,
+                           .effects = {effect.name},
+                           .size = 3,
+                           .order = sim::RecordOrder::random,
+                           .samples_per_pose = 10,
+                           .static_s = 1};
+    const StudySet set = make_set(design);
+    ASSERT_EQ(set.size.size(), 1U);
+    if (std::string(effect.name) == "adc.stuck_bit") continue;  // bits come in powers of two
+    EXPECT_TRUE(set.feasible) << effect.name << " " << set.size.front();
+    EXPECT_NEAR(set.size.front(), 3, 0.3) << effect.name;
+    EXPECT_GT(set.sigma.front(), 0) << effect.name;
+  }
+}
+
+TEST(DiagnosisStudy, SameSeedSameSet) {
+  const SetDesign design{.seed = 3, .effects = {"rig.backlash"}, .size = 3, .static_s = 1};
+  const StudySet first = make_set(design);
+  const StudySet second = make_set(design);
+  EXPECT_EQ(first.set.run.samples.u_V, second.set.run.samples.u_V);
+  EXPECT_EQ(first.static_record.u_V, second.static_record.u_V);
+  EXPECT_NE(first.set.run.samples.u_V, first.plain.run.samples.u_V);
+}
+
+/// A set of which only the truth matters.
+StudySet with_truth(const SetDesign& design, std::vector<sim::EffectSetting> effects) {
+  StudySet set = make_set({.seed = design.seed, .static_s = 1});
+  set.effects = std::move(effects);
+  return set;
+}
+
+FoundEffect finding(std::string id, std::vector<std::size_t> axes,
+                    std::vector<std::string> alternatives = {}) {
+  FoundEffect found;
+  found.id = std::move(id);
+  found.axes = std::move(axes);
+  found.alternatives = std::move(alternatives);
+  return found;
+}
+
+TEST(DiagnosisStudy, ScoresFindingsByHand) {
+  const SetDesign design{.seed = 1, .effects = {"sensor.quadratic", "rig.base_roll"}};
+  const StudySet set =
+      with_truth(design, {{"sensor.quadratic", {1}, {{"k2", 0.02}}, {}, "bias"},
+                          {"rig.base_roll", {0, 1, 2}, {{"epsilon", 1.0}}, {}, "bias"}});
+  Calibration calibration;  // one that got the 12 parameters right
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto& K = set.world.triad.K_V_per_g[i];
+    AxisEstimate& estimate = calibration.final.batch_ls[i];
+    estimate.value << K[0], K[1], K[2], set.world.triad.U0_V[i];
+    estimate.covariance.setIdentity();
+  }
+  calibration.estimates = calibration.final;
+  Diagnosis& diagnosis = calibration.diagnosis;
+
+  const SetOutcome nothing = score(design, set, calibration);
+  EXPECT_EQ(nothing.K_within, 9);
+  EXPECT_EQ(nothing.U0_within, 3);
+  EXPECT_EQ(nothing.effects, 2);
+  EXPECT_EQ(nothing.named_or_stated, 0);
+  EXPECT_EQ(nothing.missed(), 2);
+  EXPECT_EQ(nothing.wrong, 0);
+
+  diagnosis.effects = {finding("sensor.quadratic", {1}),
+                       finding("rig.axis_skew", {0, 1, 2}, {"rig.base_roll"})};
+  diagnosis.effects[0].parameters = {{"k2", 1, 0.025, 0.002, "g/g^2"}};
+  SetOutcome outcome = score(design, set, calibration);
+  EXPECT_EQ(outcome.named, 1);
+  EXPECT_EQ(outcome.named_or_stated, 2);
+  EXPECT_EQ(outcome.wrong, 0);
+  EXPECT_EQ(outcome.parameters, 1);
+  EXPECT_EQ(outcome.parameters_within, 0);  // 2.5 u away
+
+  // Another axis, another name, and a third finding: one of them is beyond the two true ones.
+  diagnosis.effects = {finding("sensor.quadratic", {0}), finding("rig.tilt_index", {0, 1, 2}),
+                       finding("sensor.drift", {1})};
+  outcome = score(design, set, calibration);
+  EXPECT_EQ(outcome.named_or_stated, 0);
+  EXPECT_EQ(outcome.wrong, 3);
+  EXPECT_EQ(outcome.additional(), 1);
+
+  diagnosis.effects = {finding("sensor.cubic", {1}, {"sensor.quadratic+rig.base_roll"})};
+  outcome = score(design, set, calibration);
+  EXPECT_EQ(outcome.named, 0);
+  EXPECT_EQ(outcome.named_or_stated, 2);
+
+  diagnosis.effects = {finding("sensor.quadratic", {0, 1})};
+  outcome = score(design, set, calibration);
+  EXPECT_EQ(outcome.named, 0);
+  EXPECT_EQ(outcome.named_or_stated, 1);
+  EXPECT_EQ(outcome.wrong, 1);
+}
+
+TEST(DiagnosisStudy, WilsonLimitsByHand) {
+  const Share none{0, 500};
+  EXPECT_NEAR(none.lower(), 0, 1e-12);
+  EXPECT_NEAR(none.upper(), 3.8415 / 503.8415, 1e-5);  // z²/(n + z²)
+  const Share half{50, 100};
+  EXPECT_NEAR(half.lower(), 0.4038, 1e-4);
+  EXPECT_NEAR(half.upper(), 0.5962, 1e-4);
+}
+
+}  // namespace
+}  // namespace plumbline::study
