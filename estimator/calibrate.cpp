@@ -294,9 +294,11 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
   result.final.rls.reset();
   result.after = result.before;
   if (result.diagnosis.verdict != Verdict::undetermined) {
-    ExplainInput explain_input{input, experiment.poses, experiment.windows, result.noise, {}};
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    ExplainInput explain_input{input, experiment.poses, experiment.windows, result.noise, {}, {}};
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       explain_input.positioning_V2[axis] = work[axis].positioning_V2;
+      explain_input.pooled[axis] = work[axis].test.noise;
+    }
     if (const auto worst = explain(explain_input, options, result)) {
       worst_error_mps2 = worst->error_mps2;
       u_worst_mps2 = worst->u_mps2;

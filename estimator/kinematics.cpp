@@ -5,6 +5,19 @@
 
 namespace plumbline {
 
+Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma) {
+  const double ch = std::cos(head.h_rad), sh = std::sin(head.h_rad);
+  const double cd = std::cos(head.delta_rad), sd = std::sin(head.delta_rad);
+  const double ce = std::cos(head.roll_rad), se = std::sin(head.roll_rad);
+  const double cn = std::cos(head.skew_rad), sn = std::sin(head.skew_rad);
+  // The plumb line along the triad's axes at δ = 0: x and y in the plane of the turntable, z along
+  // the spindle.
+  const double up_x = ch * ce;
+  const double up_y = sn * sh * ce - cn * se;
+  const double up_z = cn * sh * ce + sn * se;
+  return gamma * Eigen::Vector3d(up_x * cd + up_y * sd, -up_x * sd + up_y * cd, up_z);
+}
+
 SpecificForce specific_force(double delta_deg, double h_deg, double gamma) {
   constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
   const double sin_delta = std::sin(delta_deg * kRadiansPerDegree);
@@ -12,7 +25,7 @@ SpecificForce specific_force(double delta_deg, double h_deg, double gamma) {
   const double sin_h = std::sin(h_deg * kRadiansPerDegree);
   const double cos_h = std::cos(h_deg * kRadiansPerDegree);
   SpecificForce force;
-  force.a_g = gamma * Eigen::Vector3d(cos_h * cos_delta, -cos_h * sin_delta, sin_h);
+  force.a_g = specific_force_g({delta_deg * kRadiansPerDegree, h_deg * kRadiansPerDegree}, gamma);
   force.d_delta_g_per_rad = gamma * Eigen::Vector3d(-cos_h * sin_delta, -cos_h * cos_delta, 0.0);
   force.d_h_g_per_rad = gamma * Eigen::Vector3d(-sin_h * cos_delta, sin_h * sin_delta, cos_h);
   return force;

@@ -6,6 +6,20 @@
 
 namespace plumbline {
 
+/// Head and base with their errors at one visit.
+struct HeadGeometry {
+  double delta_rad = 0;
+  double h_rad = 0;
+  double roll_rad = 0;  ///< of the base about x_b
+  double skew_rad = 0;  ///< of the spindle against the normal of the tilt axis
+
+  bool operator==(const HeadGeometry&) const = default;
+};
+
+/// Specific force in the sensor frame, standard g. With zero roll and skew this is
+/// γ·(cos h cos δ, −cos h sin δ, sin h).
+Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma);
+
 /// Specific force at rest in the sensor frame, in standard g, and how it changes with the angles.
 struct SpecificForce {
   Eigen::Vector3d a_g;

@@ -20,12 +20,11 @@ struct Rival {
 };
 
 // Best hypothesis of each family, largest gain first.
-std::vector<Rival> best_of_families(const CandidateList& list,
-                                    const CandidateDirections& directions,
+std::vector<Rival> best_of_families(const CandidateList& list, const CandidateGains& gains_of,
                                     const Eigen::VectorXd& gains) {
   std::vector<Rival> best(list.family_size.size(), {0, -1});
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
-    if (directions.dof(c) == 0) continue;
+    if (gains_of.dof(c) == 0) continue;
     Rival& family = best[list.candidates[c].family];
     const double gain = gains(static_cast<Eigen::Index>(c));
     if (gain > family.gain) family = {c, gain};
@@ -44,17 +43,18 @@ EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
                        const EnlargedParameters& base, const std::vector<Candidate>& added) {
   EnlargedParameters model = base;
   for (const Candidate& candidate : added) model.effects.push_back(candidate.active());
-  return fit_enlarged(input.log, input.mean_V, result.whitening, model);
+  return fit_enlarged(input.log, input.observed, result.whitening, model);
 }
 
 }  // namespace
 
 std::vector<std::string> find_alternatives(const SearchInput& input, const CandidateList& list,
+                                           const CandidateResponses& responses,
                                            const SearchResult& result, std::size_t index) {
   const Candidate& found = result.evidence[index].candidate;
   EnlargedParameters base = result.fit.parameters;
   base.effects.erase(base.effects.begin() + static_cast<std::ptrdiff_t>(index));
-  const EnlargedFit without = fit_enlarged(input.log, input.mean_V, result.whitening, base);
+  const EnlargedFit without = fit_enlarged(input.log, input.observed, result.whitening, base);
   const double found_gain = without.chi2 - result.fit.chi2;
   const auto found_free =
       static_cast<double>(result.fit.parameters.free_count() - base.free_count());
@@ -70,9 +70,10 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
   };
 
   std::vector<std::pair<double, std::string>> singles;
-  const CandidateDirections directions(input.log, list, result.whitening, without);
+  // Responses at the final model: they hardly depend on the parameters.
+  const CandidateGains gains_of(responses, without);
   const auto ranked =
-      best_of_families(list, directions, directions.gains(without.whitened_residual).col(0));
+      best_of_families(list, gains_of, gains_of.of(without.whitened_residual).col(0));
   std::size_t refined = 0;
   for (const Rival& rival : ranked) {
     const Candidate& candidate = list.candidates[rival.candidate];
@@ -104,8 +105,8 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
     if (!sum.empty() && without.chi2 - fit.chi2 < 0.8 * found_gain) break;
     std::vector<Rival> order = ranked;
     if (!sum.empty()) {
-      const CandidateDirections next(input.log, list, result.whitening, fit);
-      order = best_of_families(list, next, next.gains(fit.whitened_residual).col(0));
+      const CandidateGains next(responses, fit);
+      order = best_of_families(list, next, next.of(fit.whitened_residual).col(0));
     }
     const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {
       const Candidate& candidate = list.candidates[r.candidate];

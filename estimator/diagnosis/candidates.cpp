@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "estimator/effects/catalogue.h"
@@ -43,7 +44,7 @@ CandidateList all_candidates(const VisitLog& log) {
     list.owned.push_back(std::move(effect));
     add_candidates(list, log, *list.owned.back());
   }
-  for (auto& term : smooth_terms(log)) {
+  for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
     list.owned.push_back(std::move(term));
     add_candidates(list, log, *list.owned.back(), kUnnamed);
   }
@@ -66,124 +67,184 @@ void for_column_blocks(Eigen::Index columns, const Work& work) {
 struct Baseline {
   const VisitLog& log;
   const EnlargedParameters& model;
-  PerAxis<Eigen::VectorXd> mean_V;
-  std::vector<Eigen::Vector3d> a_g;  ///< with the geometry of the model's effects
+  std::vector<HeadGeometry> head;    ///< with the model's own effects
+  std::vector<Eigen::Vector3d> a_g;  ///< seen through that geometry
 };
 
-// What the mean readings of all axes change by when `active` joins the model, V, 3n rows. A sensor
-// effect adds its term to one axis; a head effect moves everything.
-void add_response(const Baseline& base, const ActiveEffect& active,
-                  Eigen::Ref<Eigen::VectorXd> change) {
-  const Eigen::Index n = base.mean_V[0].size();
-  if (active.effect->subject() == Subject::sensor) {
-    const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
-    const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
-    const Eigen::Index at = static_cast<Eigen::Index>(active.axis) * n;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const auto visit = static_cast<std::size_t>(k);
-      const double response_V = twelve.head<3>().dot(base.a_g[visit]);
-      const TermInput input{
-          base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
-      change(at + k) = K_ii * active.effect->term_g(input, active.p.data());
-    }
-    return;
+// Term that a sensor effect adds to its axis, V, n rows.
+void add_sensor_response(const Baseline& base, const ActiveEffect& active,
+                         Eigen::Ref<Eigen::VectorXd> change) {
+  const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
+  const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
+  for (Eigen::Index k = 0; k < change.size(); ++k) {
+    const auto visit = static_cast<std::size_t>(k);
+    const double response_V = twelve.head<3>().dot(base.a_g[visit]);
+    const TermInput input{
+        base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+    change(k) = K_ii * active.effect->term_g(input, active.p.data());
   }
-  EnlargedParameters with = base.model;
-  with.effects.push_back(active);
-  const auto predicted = predict_means_V(base.log, with);
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    change.segment(static_cast<Eigen::Index>(i) * n, n) = predicted[i] - base.mean_V[i];
+}
+
+// What a head effect changes on all axes, V, 3n rows. What it changes in the terms of sensor
+// effects that are in the model already is left to the refit.
+void add_head_response(const Baseline& base, const ActiveEffect& active,
+                       Eigen::Ref<Eigen::VectorXd> change) {
+  const auto n = static_cast<Eigen::Index>(base.head.size());
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto visit = static_cast<std::size_t>(k);
+    HeadGeometry head = base.head[visit];
+    active.effect->displace(base.log, visit, active.p.data(), head);
+    if (head == base.head[visit]) continue;  // most candidates concern few visits
+    const Eigen::Vector3d moved = specific_force_g(head, base.log.gamma) - base.a_g[visit];
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      change(static_cast<Eigen::Index>(i) * n + k) = base.model.twelve[i].head<3>().dot(moved);
+  }
+}
+
+/// The candidate once per amplitude with the other amplitudes at zero; an effect of shapes and
+/// indices alone once as it stands.
+std::vector<ActiveEffect> single_amplitudes(const Candidate& candidate) {
+  const auto infos = candidate.effect->parameters();
+  const ActiveEffect active = candidate.active();
+  std::vector<ActiveEffect> singles;
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    if (infos[k].role != ParameterRole::amplitude || active.p[k] == 0) continue;
+    ActiveEffect single = active;
+    for (std::size_t other = 0; other < infos.size(); ++other) {
+      if (other != k && infos[other].role == ParameterRole::amplitude) single.p[other] = 0;
+    }
+    singles.push_back(std::move(single));
+  }
+  if (singles.empty()) singles.push_back(active);
+  return singles;
+}
+
+constexpr std::size_t kHead = 2 * kAxisCount;
+
+std::size_t group_of(const Candidate& candidate) {
+  if (candidate.effect->subject() == Subject::head) return kHead;
+  return candidate.axis + (candidate.effect->within_dwell() ? kAxisCount : 0);
+}
+
+// The course of the dwells that a sensor effect makes, V, n rows a contrast.
+void add_dwell_response(const Baseline& base, const ActiveEffect& active,
+                        Eigen::Ref<Eigen::VectorXd> change) {
+  const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
+  const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
+  const auto n = static_cast<Eigen::Index>(base.a_g.size());
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto visit = static_cast<std::size_t>(k);
+    const double response_V = twelve.head<3>().dot(base.a_g[visit]);
+    const TermInput input{
+        base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+    const Eigen::VectorXd contrasts = dwell_contrasts_V(input, active);
+    for (Eigen::Index d = 0; d < kDwellContrasts; ++d) change(d * n + k) = contrasts(d);
   }
 }
 
 }  // namespace
 
-CandidateDirections::CandidateDirections(const VisitLog& log, const CandidateList& list,
-                                         const PoseWhitening& whitening, const EnlargedFit& fit) {
-  const Eigen::Index rows = fit.whitened_residual.size();
-  {
-    const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
-    const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
-    model_basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(rows, scaled.cols());
+Eigen::MatrixXd CandidateResponses::Group::products(const Eigen::MatrixXd& stacked) const {
+  Eigen::MatrixXd result = means.transpose() * stacked.middleRows(first_row, means.rows());
+  if (dwells.rows() > 0)
+    result += dwells.transpose() * stacked.middleRows(first_dwell_row, dwells.rows());
+  return result;
+}
+
+CandidateResponses candidate_responses(const VisitLog& log, const CandidateList& list,
+                                       const PoseWhitening& whitening,
+                                       const EnlargedParameters& model) {
+  const auto n = static_cast<Eigen::Index>(log.visits.size());
+  CandidateResponses responses;
+  std::array<std::vector<ActiveEffect>, kHead + 1> singles;
+  for (const Candidate& candidate : list.candidates) {
+    const std::size_t group = group_of(candidate);
+    const std::vector<ActiveEffect> own = single_amplitudes(candidate);
+    responses.place.push_back({group, std::ssize(singles[group]), std::ssize(own)});
+    singles[group].insert(singles[group].end(), own.begin(), own.end());
   }
-  // One column for each amplitude; an effect of shapes alone is one column as it stands.
-  std::vector<ActiveEffect> singles;
-  std::vector<std::size_t> owner;
-  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
-    const Candidate& candidate = list.candidates[c];
-    const auto infos = candidate.effect->parameters();
-    const ActiveEffect active = candidate.active();
-    std::vector<std::size_t> amplitudes;
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0) amplitudes.push_back(k);
-    }
-    if (amplitudes.empty()) {
-      singles.push_back(active);
-      owner.push_back(c);
-    }
-    for (std::size_t amplitude : amplitudes) {
-      singles.push_back(active);
-      owner.push_back(c);
-      for (std::size_t other : amplitudes) {
-        if (other != amplitude) singles.back().p[other] = 0;
+  const Baseline base{log, model, head_geometries(log, model), specific_forces_g(log, model)};
+  for (std::size_t g = 0; g <= kHead; ++g) {
+    CandidateResponses::Group& group = responses.groups[g];
+    const bool of_head = g == kHead;
+    const bool within_dwell = !of_head && g >= kAxisCount;
+    const std::size_t axis = of_head ? 0 : g % kAxisCount;
+    const auto first_axis = static_cast<Eigen::Index>(axis);
+    const Eigen::Index columns = std::ssize(singles[g]);
+    group.first_row = first_axis * n;
+    group.means = Eigen::MatrixXd::Zero(of_head ? mean_rows(log) : n, columns);
+    group.first_dwell_row = mean_rows(log) + first_axis * kDwellContrasts * n;
+    group.dwells = Eigen::MatrixXd::Zero(within_dwell ? kDwellContrasts * n : 0, columns);
+    for_column_blocks(columns, [&](Eigen::Index first, Eigen::Index count) {
+      auto block = group.means.middleCols(first, count);
+      for (Eigen::Index j = 0; j < count; ++j) {
+        const ActiveEffect& single = singles[g][static_cast<std::size_t>(first + j)];
+        if (of_head) {
+          add_head_response(base, single, block.col(j));
+        } else {
+          add_sensor_response(base, single, block.col(j));
+        }
+        if (within_dwell) add_dwell_response(base, single, group.dwells.col(first + j));
       }
-    }
+      for (std::size_t i = axis; i < (of_head ? kAxisCount : axis + 1); ++i) {
+        auto rows = block.middleRows(static_cast<Eigen::Index>(i - axis) * n, n);
+        whitening.lower[i].triangularView<Eigen::Lower>().solveInPlace(rows);
+      }
+    });
+    for (Eigen::Index d = 0; within_dwell && d < kDwellContrasts; ++d)
+      group.dwells.middleRows(d * n, n) /= whitening.dwell_sd_V[axis](d);
   }
-  const Baseline base{log, fit.parameters, predict_means_V(log, fit.parameters),
-                      specific_forces_g(log, fit.parameters)};
-  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(rows, std::ssize(singles));
-  for_column_blocks(all.cols(), [&](Eigen::Index first, Eigen::Index count) {
-    for (Eigen::Index j = first; j < first + count; ++j) {
-      add_response(base, singles[static_cast<std::size_t>(j)], all.col(j));
-    }
-    all.middleCols(first, count) = whitening.apply(all.middleCols(first, count));
-  });
-  const Eigen::VectorXd before = all.colwise().norm();
-  all = project(all);
-
-  dof_.assign(list.candidates.size(), 0);
-  first_.assign(list.candidates.size(), 0);
-  basis_.resize(rows, all.cols());
-  Eigen::Index used = 0;
-  for (Eigen::Index j = 0; j < all.cols(); ++j) {
-    const std::size_t c = owner[static_cast<std::size_t>(j)];
-    if (dof_[c] == 0) first_[c] = used;
-    Eigen::VectorXd direction = all.col(j);
-    for (Eigen::Index k = first_[c]; k < used; ++k) {
-      direction -= basis_.col(k).dot(direction) * basis_.col(k);
-    }
-    // What is left of an absorbed effect is rounding, not evidence.
-    const double norm = direction.norm();
-    if (!(norm > 1e-3 * before(j)) || !(norm > 0)) continue;
-    basis_.col(used++) = direction / norm;
-    ++dof_[c];
-  }
-  basis_.conservativeResize(Eigen::NoChange, used);
+  return responses;
 }
 
-Eigen::MatrixXd CandidateDirections::project(const Eigen::MatrixXd& whitened) const {
-  Eigen::MatrixXd projected(whitened.rows(), whitened.cols());
-  for_column_blocks(whitened.cols(), [&](Eigen::Index first, Eigen::Index count) {
-    const auto block = whitened.middleCols(first, count);
-    projected.middleCols(first, count) = block - model_basis_ * (model_basis_.transpose() * block);
-  });
-  return projected;
+CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
+    : responses_(responses) {
+  const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
+  const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
+  model_basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
+
+  std::array<Eigen::MatrixXd, kHead + 1> taken;  // by the model's parameters, columns × p
+  parallel_for(taken.size(),
+               [&](std::size_t g) { taken[g] = responses.groups[g].products(model_basis_); });
+  transform_.resize(responses.place.size());
+  for (std::size_t c = 0; c < transform_.size(); ++c) {
+    const auto& [g, first, count] = responses.place[c];
+    const auto means = responses.groups[g].means.middleCols(first, count);
+    const auto dwells = responses.groups[g].dwells.middleCols(first, count);
+    const auto lost = taken[g].middleRows(first, count);
+    const Eigen::MatrixXd whole = means.transpose() * means + dwells.transpose() * dwells;
+    const Eigen::MatrixXd gram = whole - lost * lost.transpose();
+    // Gram-Schmidt in the metric of what the model leaves.
+    Eigen::MatrixXd transform(0, count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      Eigen::RowVectorXd direction = Eigen::RowVectorXd::Unit(count, j);
+      for (Eigen::Index k = 0; k < transform.rows(); ++k)
+        direction -= transform.row(k).dot(gram.col(j)) * transform.row(k);
+      const double square = (direction * gram * direction.transpose()).value();
+      // What is left of an absorbed effect is rounding, not evidence.
+      constexpr double kAbsorbed = 1e-3;
+      if (!(square > kAbsorbed * kAbsorbed * whole(j, j)) || !(square > 0)) continue;
+      transform.conservativeResize(transform.rows() + 1, Eigen::NoChange);
+      transform.row(transform.rows() - 1) = direction / std::sqrt(square);
+    }
+    transform_[c] = std::move(transform);
+  }
 }
 
-Eigen::MatrixXd CandidateDirections::gains(const Eigen::MatrixXd& whitened) const {
-  Eigen::MatrixXd squares(basis_.cols(), whitened.cols());
-  for_column_blocks(basis_.cols(), [&](Eigen::Index first, Eigen::Index count) {
-    squares.middleRows(first, count) =
-        (basis_.middleCols(first, count).transpose() * whitened).cwiseAbs2();
-  });
-  Eigen::MatrixXd gain =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(dof_.size()), whitened.cols());
-  for (std::size_t c = 0; c < dof_.size(); ++c) {
-    if (dof_[c] > 0) {
-      gain.row(static_cast<Eigen::Index>(c)) =
-          squares.middleRows(first_[c], dof_[c]).colwise().sum();
-    }
+Eigen::MatrixXd CandidateGains::project(const Eigen::MatrixXd& whitened) const {
+  return whitened - model_basis_ * (model_basis_.transpose() * whitened);
+}
+
+Eigen::MatrixXd CandidateGains::of(const Eigen::MatrixXd& whitened) const {
+  std::array<Eigen::MatrixXd, kHead + 1> seen;  // columns × replicates
+  parallel_for(seen.size(),
+               [&](std::size_t g) { seen[g] = responses_.groups[g].products(whitened); });
+  Eigen::MatrixXd gain(std::ssize(transform_), whitened.cols());
+  for (std::size_t c = 0; c < transform_.size(); ++c) {
+    const auto& [g, first, count] = responses_.place[c];
+    gain.row(static_cast<Eigen::Index>(c)) =
+        (transform_[c] * seen[g].middleRows(first, count)).colwise().squaredNorm();
   }
   return gain;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -36,27 +37,50 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
 /// must be e^7 times as likely as one with a name: a polynomial can imitate much.
 CandidateList all_candidates(const VisitLog& log);
 
-/// What each candidate would add to a fitted model, orthonormal and free of everything that the
-/// model's own parameters can take up.
-class CandidateDirections {
- public:
-  /// `fit` is the model so far; directions are taken at its parameters.
-  CandidateDirections(const VisitLog& log, const CandidateList& list,
-                      const PoseWhitening& whitening, const EnlargedFit& fit);
+/// What each candidate would add to the whitened observations. A sensor effect moves one axis only,
+/// so its columns hold n rows; those of the head hold 3n; what changes within the dwell has rows
+/// for the contrasts besides.
+struct CandidateResponses {
+  struct Group {
+    Eigen::Index first_row = 0;  ///< of `means` among the stacked rows
+    Eigen::MatrixXd means;
+    Eigen::Index first_dwell_row = 0;
+    Eigen::MatrixXd dwells;  ///< no rows for what is constant within the dwell
+    /// Products of the columns with a stacked matrix, columns × its columns.
+    Eigen::MatrixXd products(const Eigen::MatrixXd& stacked) const;
+  };
+  struct Place {
+    std::size_t group = 0;
+    Eigen::Index first = 0;
+    Eigen::Index count = 0;
+  };
+  std::array<Group, 2 * kAxisCount + 1> groups;  ///< x, y, z; x, y, z within the dwell; head
+  std::vector<Place> place;                      ///< one per candidate
+};
 
-  /// By how much each candidate would lower the sum of squares of `whitened` (3n rows; one column a
-  /// replicate): candidates × columns, to first order.
-  Eigen::MatrixXd gains(const Eigen::MatrixXd& whitened) const;
+/// One column for each amplitude of each candidate, at the parameters of `model`.
+CandidateResponses candidate_responses(const VisitLog& log, const CandidateList& list,
+                                       const PoseWhitening& whitening,
+                                       const EnlargedParameters& model);
+
+/// By how much each candidate would improve a fitted model, to first order.
+class CandidateGains {
+ public:
+  /// Responses and fit belong to the same whitening.
+  CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit);
+
+  /// By how much each candidate would lower the sum of squares of `whitened` (stacked rows, free of
+  /// what the model's parameters take up; one column a replicate): candidates × columns.
+  Eigen::MatrixXd of(const Eigen::MatrixXd& whitened) const;
   /// Free directions of a candidate; 0 when the model absorbs it.
-  int dof(std::size_t candidate) const { return dof_[candidate]; }
+  int dof(std::size_t candidate) const { return static_cast<int>(transform_[candidate].rows()); }
   /// Removes from each column what the model's parameters take up.
   Eigen::MatrixXd project(const Eigen::MatrixXd& whitened) const;
 
  private:
-  Eigen::MatrixXd model_basis_;  ///< 3n × p, orthonormal
-  Eigen::MatrixXd basis_;        ///< 3n × Σ dof
-  std::vector<int> dof_;
-  std::vector<Eigen::Index> first_;
+  const CandidateResponses& responses_;
+  Eigen::MatrixXd model_basis_;             ///< stacked × p, orthonormal
+  std::vector<Eigen::MatrixXd> transform_;  ///< dof × columns: to orthonormal directions
 };
 
 }  // namespace plumbline

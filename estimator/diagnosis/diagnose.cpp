@@ -118,6 +118,10 @@ void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
   Diagnosis& diagnosis = diagnosed.diagnosis;
   diagnosis = {};
   std::vector<FoundEffect> found = report_effects(input.log, search.fit);
+  CandidateResponses responses;
+  if (!search.evidence.empty())
+    responses = candidate_responses(input.log, diagnosed.candidates, search.whitening,
+                                    search.fit.parameters);
   for (std::size_t e = 0; e < search.evidence.size(); ++e) {
     const Effect& effect = *search.evidence[e].candidate.effect;
     const std::string id = effect.id();
@@ -131,7 +135,8 @@ void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
     for (FoundEffect& entry : found) {
       if (entry.id != id) continue;
       entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
-      merge_names(entry.alternatives, find_alternatives(input, diagnosed.candidates, search, e));
+      merge_names(entry.alternatives,
+                  find_alternatives(input, diagnosed.candidates, responses, search, e));
     }
   }
   std::erase_if(found, [](const FoundEffect& f) { return f.id.starts_with("unlisted:"); });

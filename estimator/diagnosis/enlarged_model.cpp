@@ -72,20 +72,49 @@ void EnlargedParameters::set_free_values(const Eigen::VectorXd& values) {
   }
 }
 
-std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
-                                               const EnlargedParameters& parameters) {
-  std::vector<Eigen::Vector3d> a_g(log.visits.size());
-  for (std::size_t k = 0; k < a_g.size(); ++k) {
+std::vector<HeadGeometry> head_geometries(const VisitLog& log,
+                                          const EnlargedParameters& parameters) {
+  std::vector<HeadGeometry> heads;
+  heads.reserve(log.visits.size());
+  for (std::size_t k = 0; k < log.visits.size(); ++k) {
     HeadGeometry head{log.visits[k].delta_rad, log.visits[k].h_rad};
     for (const ActiveEffect& active : parameters.effects) {
       if (active.effect->subject() == Subject::head) {
         active.effect->displace(log, k, active.p.data(), head);
       }
     }
-    a_g[k] = specific_force_g(head, log.gamma);
+    heads.push_back(head);
   }
+  return heads;
+}
+
+std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
+                                               const EnlargedParameters& parameters) {
+  std::vector<Eigen::Vector3d> a_g;
+  a_g.reserve(log.visits.size());
+  for (const HeadGeometry& head : head_geometries(log, parameters))
+    a_g.push_back(specific_force_g(head, log.gamma));
   return a_g;
 }
+
+namespace {
+
+/// Calls work(input, active effect) for every sensor effect of one axis at every visit.
+template <class Work>
+void for_sensor_terms(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
+                      const std::vector<Eigen::Vector3d>& a_g, const Work& work) {
+  const Eigen::Vector4d& twelve = parameters.twelve[axis];
+  const double K_ii = twelve(static_cast<Eigen::Index>(axis));
+  for (std::size_t k = 0; k < log.visits.size(); ++k) {
+    const double response_V = twelve.head<3>().dot(a_g[k]);
+    const TermInput input{log, k, axis, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+    for (const ActiveEffect& active : parameters.effects) {
+      if (active.effect->subject() == Subject::sensor && active.axis == axis) work(input, active);
+    }
+  }
+}
+
+}  // namespace
 
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
                                          const EnlargedParameters& parameters) {
@@ -94,31 +123,83 @@ PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
   PerAxis<Eigen::VectorXd> mean_V;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const Eigen::Vector4d& twelve = parameters.twelve[i];
-    const double K_ii = twelve(static_cast<Eigen::Index>(i));
     mean_V[i].resize(static_cast<Eigen::Index>(n));
-    for (std::size_t k = 0; k < n; ++k) {
-      const double response_V = twelve.head<3>().dot(a_g[k]);
-      TermInput input{log, k, i, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
-      double term_g = 0;
-      for (const ActiveEffect& active : parameters.effects) {
-        if (active.effect->subject() == Subject::sensor && active.axis == i) {
-          term_g += active.effect->term_g(input, active.p.data());
-        }
-      }
-      mean_V[i](static_cast<Eigen::Index>(k)) = twelve(3) + response_V + K_ii * term_g;
-    }
+    for (std::size_t k = 0; k < n; ++k)
+      mean_V[i](static_cast<Eigen::Index>(k)) = twelve(3) + twelve.head<3>().dot(a_g[k]);
+    for_sensor_terms(log, parameters, i, a_g,
+                     [&](const TermInput& input, const ActiveEffect& active) {
+                       mean_V[i](static_cast<Eigen::Index>(input.visit)) +=
+                           input.K_V_per_g * active.effect->term_g(input, active.p.data());
+                     });
   }
   return mean_V;
 }
 
+Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active) {
+  const Visit& visit = input.at();
+  Eigen::VectorXd course_V(static_cast<Eigen::Index>(visit.count));
+  for (Eigen::Index m = 0; m < course_V.size(); ++m)
+    course_V(m) =
+        input.K_V_per_g *
+        active.effect->sample_term_g(input, active.p.data(), visit.step_s * static_cast<double>(m));
+  return input.log.contrasts.at(visit.count).transpose() * course_V;
+}
+
+PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
+                                          const EnlargedParameters& parameters) {
+  PerAxis<Eigen::MatrixXd> dwell_V;
+  dwell_V.fill(Eigen::MatrixXd::Zero(std::ssize(log.visits), kDwellContrasts));
+  if (std::none_of(parameters.effects.begin(), parameters.effects.end(),
+                   [](const ActiveEffect& a) { return a.effect->within_dwell(); }))
+    return dwell_V;
+  const std::vector<Eigen::Vector3d> a_g = specific_forces_g(log, parameters);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    for_sensor_terms(log, parameters, i, a_g,
+                     [&](const TermInput& input, const ActiveEffect& active) {
+                       if (active.effect->within_dwell())
+                         dwell_V[i].row(static_cast<Eigen::Index>(input.visit)) +=
+                             dwell_contrasts_V(input, active);
+                     });
+  }
+  return dwell_V;
+}
+
+Observations observe(const MeasurementSet& set, const VisitLog& log) {
+  Observations observed;
+  const auto n = std::ssize(set.poses);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    observed.mean_V[i].resize(n);
+    observed.dwell_V[i].resize(n, kDwellContrasts);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const Pose& pose = set.poses[static_cast<std::size_t>(k)];
+      const Eigen::Map<const Eigen::VectorXd> dwell_V(set.samples.u_V[i].data() + pose.first,
+                                                      static_cast<Eigen::Index>(pose.count));
+      observed.mean_V[i](k) = dwell_V.mean();
+      observed.dwell_V[i].row(k) = log.contrasts.at(pose.count).transpose() * dwell_V;
+    }
+  }
+  return observed;
+}
+
+Eigen::Index mean_rows(const VisitLog& log) { return kAxes * std::ssize(log.visits); }
+Eigen::Index stacked_rows(const VisitLog& log) { return (1 + kDwellContrasts) * mean_rows(log); }
+
 namespace {
 
-Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& per_axis) {
-  const Eigen::Index n = per_axis[0].size();
-  Eigen::VectorXd all(kAxes * n);
-  for (Eigen::Index i = 0; i < kAxes; ++i)
-    all.segment(i * n, n) = per_axis[static_cast<std::size_t>(i)];
+Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
+                        const PerAxis<Eigen::MatrixXd>& dwell_V) {
+  const Eigen::Index n = mean_V[0].size();
+  Eigen::VectorXd all((1 + kDwellContrasts) * kAxes * n);
+  for (Eigen::Index i = 0; i < kAxes; ++i) {
+    const auto axis = static_cast<std::size_t>(i);
+    all.segment(i * n, n) = mean_V[axis];
+    all.segment((kAxes + i * kDwellContrasts) * n, kDwellContrasts * n) = dwell_V[axis].reshaped();
+  }
   return all;
+}
+
+Eigen::VectorXd predict_stacked(const VisitLog& log, const EnlargedParameters& parameters) {
+  return stacked(predict_means_V(log, parameters), predict_dwells_V(log, parameters));
 }
 
 std::vector<double> difference_steps(const EnlargedParameters& parameters) {
@@ -138,38 +219,40 @@ std::vector<double> difference_steps(const EnlargedParameters& parameters) {
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {
   const Eigen::VectorXd centre = parameters.free_values();
   const std::vector<double> steps = difference_steps(parameters);
-  Eigen::MatrixXd jacobian(kAxes * static_cast<Eigen::Index>(log.visits.size()), centre.size());
+  Eigen::MatrixXd jacobian(stacked_rows(log), centre.size());
   EnlargedParameters moved = parameters;
   for (Eigen::Index j = 0; j < centre.size(); ++j) {
     const double step = steps[static_cast<std::size_t>(j)];
     Eigen::VectorXd values = centre;
     values(j) = centre(j) + step;
     moved.set_free_values(values);
-    const Eigen::VectorXd above = stacked(predict_means_V(log, moved));
+    const Eigen::VectorXd above = predict_stacked(log, moved);
     values(j) = centre(j) - step;
     moved.set_free_values(values);
-    jacobian.col(j) = (above - stacked(predict_means_V(log, moved))) / (2 * step);
+    jacobian.col(j) = (above - predict_stacked(log, moved)) / (2 * step);
   }
   return jacobian;
 }
 
 Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
-  Eigen::MatrixXd whitened(all.rows(), all.cols());
+  Eigen::MatrixXd whitened = all;
   const Eigen::Index n = lower[0].rows();
   for (Eigen::Index i = 0; i < kAxes; ++i) {
-    whitened.middleRows(i * n, n) =
-        lower[static_cast<std::size_t>(i)].triangularView<Eigen::Lower>().solve(
-            all.middleRows(i * n, n));
+    const auto axis = static_cast<std::size_t>(i);
+    auto means = whitened.middleRows(i * n, n);
+    lower[axis].triangularView<Eigen::Lower>().solveInPlace(means);
+    for (Eigen::Index d = 0; d < kDwellContrasts; ++d)
+      whitened.middleRows((kAxes + i * kDwellContrasts + d) * n, n) /= dwell_sd_V[axis](d);
   }
   return whitened;
 }
 
-EnlargedFit fit_enlarged(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
+EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start) {
   constexpr int kMaxIterations = 20;
-  const Eigen::VectorXd measured = stacked(mean_V);
+  const Eigen::VectorXd measured = stacked(observed.mean_V, observed.dwell_V);
   const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
-    return whitening.apply(measured - stacked(predict_means_V(log, parameters)));
+    return whitening.apply(measured - predict_stacked(log, parameters));
   };
   EnlargedFit fit;
   fit.parameters = start;

@@ -34,6 +34,10 @@ struct EnlargedParameters {
   void set_free_values(const Eigen::VectorXd& values);
 };
 
+/// Head and base at every visit with the model's head effects.
+std::vector<HeadGeometry> head_geometries(const VisitLog& log,
+                                          const EnlargedParameters& parameters);
+
 /// Specific force at every visit with the geometry of the model's head effects, standard g.
 std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
                                                const EnlargedParameters& parameters);
@@ -41,30 +45,51 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 /// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
 
-/// Derivatives of the stacked prediction (x, then y, then z; 3n rows) by the free parameters, by
-/// central differences with steps fitted to each parameter's size.
+/// Predicted contrasts of the dwells, V, n × kDwellContrasts per axis.
+PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
+                                          const EnlargedParameters& parameters);
+
+/// Contrasts of one visit's dwell that one effect makes, V.
+Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active);
+
+/// What is measured at n visits: the means, and what the samples say beyond them.
+struct Observations {
+  PerAxis<Eigen::VectorXd> mean_V;
+  PerAxis<Eigen::MatrixXd> dwell_V;  ///< contrasts of the dwells, n × kDwellContrasts
+};
+Observations observe(const MeasurementSet& set, const VisitLog& log);
+
+/// Rows of a stacked vector: the means (x, then y, then z; 3n rows), then the contrasts, n rows for
+/// each contrast of each axis.
+Eigen::Index mean_rows(const VisitLog& log);
+Eigen::Index stacked_rows(const VisitLog& log);
+
+/// Derivatives of the stacked prediction by the free parameters, by central differences with steps
+/// fitted to each parameter's size.
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters);
 
-/// n × n lower Cholesky factors of the pose-mean covariance per axis.
+/// n × n lower Cholesky factors of the pose-mean covariance per axis, and the standard deviations
+/// of the contrasts, which are independent from visit to visit.
 struct PoseWhitening {
   PerAxis<Eigen::MatrixXd> lower;
-  /// L⁻¹ applied to each axis's block of a 3n-row matrix.
+  PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< kDwellContrasts each
+  /// Whitens a matrix of stacked rows.
   Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
 };
 
 struct EnlargedFit {
   EnlargedParameters parameters;
   Eigen::MatrixXd covariance;         ///< of the free parameters
-  Eigen::VectorXd whitened_residual;  ///< 3n
-  Eigen::MatrixXd whitened_jacobian;  ///< 3n × free
+  Eigen::VectorXd whitened_residual;  ///< stacked
+  Eigen::MatrixXd whitened_jacobian;  ///< stacked × free
   double chi2 = 0;
   bool converged = false;
   bool determined = true;  ///< no direction of the free parameters is unobservable
 };
 
 /// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
-/// factorisation). mean_V: the measured pose means.
-EnlargedFit fit_enlarged(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
+/// factorisation).
+EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start);
 
 }  // namespace plumbline

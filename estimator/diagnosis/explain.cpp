@@ -20,16 +20,13 @@ double mps2_per_V(const EnlargedParameters& model, std::size_t axis) {
 }
 
 /// Held-out errors of both partitions, m/s², one vector of 2n per axis.
-PerAxis<Eigen::VectorXd> heldout_mps2(const ExplainInput& input, const SearchInput& search,
-                                      const PoseWhitening& whitening, const EnlargedFit& fit) {
-  const auto time =
-      heldout_residuals_V(search.log, search.mean_V, whitening, fit, time_blocks(input.poses));
-  const auto position =
-      heldout_residuals_V(search.log, search.mean_V, whitening, fit, position_blocks(input.poses));
+PerAxis<Eigen::VectorXd> heldout_mps2(const Heldout& heldout, const std::vector<Blocks>& partitions,
+                                      const EnlargedFit& fit) {
+  const auto parts = heldout.residuals_V(fit, partitions);
   PerAxis<Eigen::VectorXd> all;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    all[i].resize(2 * time[i].size());
-    all[i] << time[i], position[i];
+    all[i].resize(parts[0][i].size() + parts[1][i].size());
+    all[i] << parts[0][i], parts[1][i];
     all[i] *= mps2_per_V(fit.parameters, i);
   }
   return all;
@@ -73,26 +70,27 @@ AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& searc
         input.positioning_V2[axis](row) + shared_rounding_variance(search.noise[axis]);
     const Visit& visit = search.log.visits[k];
     filter.update(specific_force_g({visit.delta_rad, visit.h_rad}, search.log.gamma),
-                  search.mean_V[axis](row) - effect_V(row), variance_V2);
+                  search.observed.mean_V[axis](row) - effect_V(row), variance_V2);
   }
   return filter.parameters();
 }
 
 /// Effects that do not help where they were not fitted are no effects.
-void drop_what_does_not_carry(const ExplainInput& input, const SearchInput& search,
+void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
+                              const std::vector<Blocks>& partitions,
                               const PerAxis<double>& floor_mps2, SearchResult& found,
                               std::vector<double>& gains) {
   for (bool dropped = true; dropped && !found.evidence.empty();) {
     dropped = false;
     gains.clear();
-    const auto with = heldout_mps2(input, search, found.whitening, found.fit);
+    const auto with = heldout_mps2(heldout, partitions, found.fit);
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
       EnlargedParameters fewer = found.fit.parameters;
       const ActiveEffect removed = fewer.effects[k];
       fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
-      EnlargedFit without = fit_enlarged(search.log, search.mean_V, found.whitening, fewer);
-      const double gain = heldout_gain(heldout_mps2(input, search, found.whitening, without), with,
-                                       floor_mps2, axes_of(removed));
+      EnlargedFit without = fit_enlarged(search.log, search.observed, found.whitening, fewer);
+      const double gain = heldout_gain(heldout_mps2(heldout, partitions, without), with, floor_mps2,
+                                       axes_of(removed));
       // One pose's own error cannot be predicted from other poses.
       const bool own = removed.effect->id() == "rig.pose_outlier";
       if (gain > 0 || own) {
@@ -112,13 +110,12 @@ void drop_what_does_not_carry(const ExplainInput& input, const SearchInput& sear
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
                                   Calibration& result) {
   const VisitLog log = make_visit_log(input.input.run, input.input.description);
-  PerAxis<Eigen::VectorXd> mean_V;
+  const Observations observed = observe(input.input.run, log);
+  const PerAxis<Eigen::VectorXd>& mean_V = observed.mean_V;
   EnlargedParameters start;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    mean_V[i] = mean_voltages(input.poses, i);
-    start.twelve[i] = result.estimates.batch_ls[i].value;
-  }
-  const SearchInput search{log, mean_V, input.noise, input.windows, input.positioning_V2, start};
+  for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
+  const SearchInput search{log,   observed,     input.noise, input.windows, input.positioning_V2,
+                           start, &input.pooled};
   SearchOptions search_options;
   search_options.seed = options.seed;
   Diagnosed diagnosed = diagnose(search, search_options);
@@ -127,13 +124,15 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
 
   std::vector<double> gains;
   const std::size_t before_dropping = found.evidence.size();
-  drop_what_does_not_carry(input, search, result.floor_pose_rms_mps2, found, gains);
+  const Heldout heldout(log, mean_V, found.whitening);
+  const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
+  drop_what_does_not_carry(search, heldout, partitions, result.floor_pose_rms_mps2, found, gains);
   if (found.evidence.empty()) return std::nullopt;
   if (found.evidence.size() != before_dropping) describe_findings(search, diagnosed);
   attach_gains(diagnosed, gains);
 
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
-  const auto heldout = heldout_mps2(input, search, found.whitening, found.fit);
+  const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
   EnlargedParameters bare = found.fit.parameters;
   bare.effects.clear();
   const auto twelve_V = predict_means_V(log, bare);
@@ -142,7 +141,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   const auto n = std::ssize(input.poses);
   WorstError worst;
-  double chi2 = found.fit.chi2;
+  const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = mps2_per_V(found.fit.parameters, i);
     result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
@@ -162,8 +161,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
       result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
     }
     result.floor_pose_rms_mps2[i] = floor_mps2;
-    result.after.heldout_pose_rms_mps2[i] = rms(heldout[i]);
-    result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout[i]);
+    result.after.heldout_pose_rms_mps2[i] = rms(heldout_errors_mps2[i]);
+    result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout_errors_mps2[i]);
     result.after.sample_rms_mps2[i] =
         std::abs(factor) * sample_rms_V(input.input.run, predicted_V[i], i);
     for (Eigen::Index k = 0; k < residual_mps2.size(); ++k) {
@@ -231,7 +230,7 @@ EnlargedParameters restore_model(const CertifiedModel& model, const VisitLog& lo
   for (std::size_t i = 0; i < kAxisCount; ++i) restored.twelve[i] = model.final[i].value;
   for (auto& effect : covariate_effects(log)) owned.push_back(std::move(effect));
   std::vector<std::shared_ptr<const SmoothTerm>> terms;
-  for (auto& term : smooth_terms(log)) {
+  for (auto& term : smooth_terms(log, SmoothTermSelection::any)) {
     terms.push_back(std::move(term));
     owned.push_back(terms.back());
   }

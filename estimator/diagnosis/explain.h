@@ -7,6 +7,7 @@
 #include "estimator/calibrate.h"
 #include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/noise/covariance.h"
+#include "estimator/noise/reml.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
@@ -17,6 +18,7 @@ struct ExplainInput {
   const std::vector<SampleWindow>& windows;
   const PerAxis<NoiseModel>& noise;         ///< as identified
   PerAxis<Eigen::VectorXd> positioning_V2;  ///< variance of each pose by the head's positioning
+  PerAxis<PooledNoise> pooled;              ///< of the pose means beside the 12 parameters
 };
 
 /// The largest error on left-out poses after effects were added.

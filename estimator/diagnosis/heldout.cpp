@@ -1,33 +1,39 @@
 #include "estimator/diagnosis/heldout.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <limits>
 
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
 
-PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
-                                             const PerAxis<Eigen::VectorXd>& mean_V,
-                                             const PoseWhitening& whitening, const EnlargedFit& fit,
-                                             const Blocks& blocks) {
-  const Eigen::Index n = mean_V[0].size();
-  const Eigen::Index p = fit.covariance.rows();
-  const auto predicted = predict_means_V(log, fit.parameters);
-  const Eigen::MatrixXd jacobian = prediction_jacobian(log, fit.parameters);
-  PerAxis<Eigen::MatrixXd> inverse, weighted_jacobian;
-  PerAxis<Eigen::VectorXd> residual, weighted_residual, heldout;
+Heldout::Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
+                 const PoseWhitening& whitening)
+    : log_(log), mean_V_(mean_V) {
   parallel_for(kAxisCount, [&](std::size_t i) {
+    const Eigen::Index n = mean_V[i].size();
     const Eigen::MatrixXd half =
         whitening.lower[i].triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
-    inverse[i] = half.transpose() * half;
-    residual[i] = mean_V[i] - predicted[i];
-    weighted_residual[i] = inverse[i] * residual[i];
-    weighted_jacobian[i] = inverse[i] * jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
-    heldout[i] = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
+    inverse_[i] = half.transpose() * half;
   });
-  for (const std::vector<Eigen::Index>& block : blocks) {
+}
+
+std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
+    const EnlargedFit& fit, const std::vector<Blocks>& partitions) const {
+  const Eigen::Index n = mean_V_[0].size();
+  const Eigen::Index p = fit.covariance.rows();
+  const auto predicted = predict_means_V(log_, fit.parameters);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(log_, fit.parameters);
+  PerAxis<Eigen::MatrixXd> axis_jacobian, weighted_jacobian;
+  PerAxis<Eigen::VectorXd> residual, weighted_residual;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    axis_jacobian[i] = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
+    residual[i] = mean_V_[i] - predicted[i];
+    weighted_residual[i] = inverse_[i] * residual[i];
+    weighted_jacobian[i] = inverse_[i] * axis_jacobian[i];
+  }
+  const auto leave_out = [&](const std::vector<Eigen::Index>& block,
+                             PerAxis<Eigen::VectorXd>& heldout) {
     // A free parameter for every reading of the block is the same as leaving it out.
     const Eigen::Index size = std::ssize(block);
     Eigen::MatrixXd Z = Eigen::MatrixXd::Zero(3 * size, 3 * size);
@@ -35,7 +41,7 @@ PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
     Eigen::VectorXd right(3 * size);
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const Eigen::Index at = static_cast<Eigen::Index>(i) * size;
-      Z.block(at, at, size, size) = inverse[i](block, block);
+      Z.block(at, at, size, size) = inverse_[i](block, block);
       weighted.middleRows(at, size) = weighted_jacobian[i](block, Eigen::all);
       right.segment(at, size) = weighted_residual[i](block);
     }
@@ -47,12 +53,20 @@ PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
     scaled.diagonal().array() += 1e-9;
     const Eigen::VectorXd d = scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right)));
     const Eigen::VectorXd shift = fit.covariance * (weighted.transpose() * d);
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const Eigen::MatrixXd rows = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
-      heldout[i](block) = residual[i](block) + rows(block, Eigen::all) * shift;
-    }
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      heldout[i](block) = residual[i](block) + axis_jacobian[i](block, Eigen::all) * shift;
+  };
+  std::vector<PerAxis<Eigen::VectorXd>> result(partitions.size());
+  std::vector<std::pair<std::size_t, std::size_t>> work;  // partition and block
+  for (std::size_t part = 0; part < partitions.size(); ++part) {
+    result[part].fill(Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN()));
+    for (std::size_t b = 0; b < partitions[part].size(); ++b) work.emplace_back(part, b);
   }
-  return heldout;
+  parallel_for(work.size(), [&](std::size_t w) {
+    const auto [part, b] = work[w];
+    leave_out(partitions[part][b], result[part]);
+  });
+  return result;
 }
 
 }  // namespace plumbline

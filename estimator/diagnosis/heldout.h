@@ -6,13 +6,24 @@
 
 namespace plumbline {
 
-/// Residuals, V, of each axis's poses against the fit to all poses outside their block (all three
-/// axes of a block are left out together), to first order in the parameters, without refitting.
-/// One vector of n per axis; poses in no block are NaN. fit and whitening belong together; `mean_V`
-/// are the measured pose means.
-PerAxis<Eigen::VectorXd> heldout_residuals_V(const VisitLog& log,
-                                             const PerAxis<Eigen::VectorXd>& mean_V,
-                                             const PoseWhitening& whitening, const EnlargedFit& fit,
-                                             const Blocks& blocks);
+/// Leaves blocks of poses out of fits that share their measured means and noise.
+class Heldout {
+ public:
+  /// mean_V: the measured pose means. The arguments must outlive this.
+  Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
+          const PoseWhitening& whitening);
+
+  /// Residuals, V, of each axis's poses against the fit to all poses outside their block (all three
+  /// axes of a block are left out together), to first order in the parameters, without refitting.
+  /// One vector of n per axis for each partition; poses in no block are NaN. `fit` was made with
+  /// the same whitening.
+  std::vector<PerAxis<Eigen::VectorXd>> residuals_V(const EnlargedFit& fit,
+                                                    const std::vector<Blocks>& partitions) const;
+
+ private:
+  const VisitLog& log_;
+  const PerAxis<Eigen::VectorXd>& mean_V_;
+  PerAxis<Eigen::MatrixXd> inverse_;  ///< of the covariance of the pose means
+};
 
 }  // namespace plumbline

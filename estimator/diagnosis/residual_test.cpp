@@ -176,8 +176,8 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
       best_pool(noise, input.windows, y, enough ? full : input.design, input.extra_variance);
   const NoisePool plain_pool =
       enough ? NoisePool(best.model(), input.windows, y, input.design, input.extra_variance) : best;
-  const Judgement plain =
-      judge(plain_pool, plain_pool.pooled(), y, input.design, functions, input.design.cols());
+  const Judgement plain = judge(plain_pool, plain_pool.pooled_with_information(), y, input.design,
+                                functions, input.design.cols());
   ResidualTestResult result;
   result.noise = plain.noise;
   result.p_structure = 1;
@@ -185,7 +185,8 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   if (enough) {
     // With the noise estimated beside the model alone, structure is partly taken for slow noise;
     // beside the functions, too, slow noise is partly taken for structure. Both count.
-    const Judgement rich = judge(best, best.pooled(), y, input.design, functions, full.cols());
+    const Judgement rich =
+        judge(best, best.pooled_with_information(), y, input.design, functions, full.cols());
     result.p_structure = merged(plain.p_structure, rich.p_structure);
     if (result.p_structure < kStructureSeen) {
       result.noise = rich.noise;

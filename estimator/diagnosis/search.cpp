@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
@@ -47,50 +48,71 @@ Eigen::MatrixXd independent_columns(const Eigen::MatrixXd& block) {
   return basis;
 }
 
+// Scatter of the contrasts about the model, from their median so that few odd dwells do not matter.
+PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
+                                         const EnlargedParameters& parameters) {
+  const auto predicted = predict_dwells_V(input.log, parameters);
+  PerAxis<Eigen::VectorXd> sd_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    sd_V[i].resize(kDwellContrasts);
+    for (Eigen::Index d = 0; d < kDwellContrasts; ++d) {
+      Eigen::VectorXd size = (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).cwiseAbs();
+      const auto middle = size.begin() + size.size() / 2;
+      std::nth_element(size.begin(), middle, size.end());
+      constexpr double kNormal = 1.4826;  // median of |x| to standard deviation
+      // Contrasts that are all zero (single readings) carry no information.
+      sd_V[i](d) = *middle > 0 ? kNormal * *middle : 1;
+    }
+  }
+  return sd_V;
+}
+
+Stage stage_with(const SearchInput& input, const EnlargedParameters& start,
+                 PerAxis<PooledNoise> noise) {
+  Stage stage;
+  stage.noise = std::move(noise);
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
+  });
+  stage.whitening.dwell_sd_V = dwell_scatter_V(input, start);
+  stage.fit = fit_enlarged(input.log, input.observed, stage.whitening, start);
+  return stage;
+}
+
 // Noise and parameters depend on each other only weakly: one round after the parameters are known
 // settles both.
-Stage settle(const SearchInput& input, const EnlargedParameters& start, const Stage* previous) {
-  constexpr int kRounds = 1;
-  Stage stage;
-  stage.fit.parameters = start;
-  if (previous != nullptr) {
-    stage.whitening = previous->whitening;
-    stage.fit = fit_enlarged(input.log, input.mean_V, stage.whitening, start);
-  }
-  for (int round = 0; round < kRounds; ++round) {
-    const auto predicted = predict_means_V(input.log, stage.fit.parameters);
-    const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, stage.fit.parameters);
-    const Eigen::Index n = predicted[0].size();
-    parallel_for(kAxisCount, [&](std::size_t i) {
-      const Eigen::MatrixXd design =
-          independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
-      const Eigen::VectorXd residual = input.mean_V[i] - predicted[i];
-      stage.noise[i] =
-          best_pool(input.noise[i], input.windows, residual, design, input.extra_variance_V2[i])
-              .pooled();
-      stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
-    });
-    stage.fit = fit_enlarged(input.log, input.mean_V, stage.whitening, stage.fit.parameters);
-  }
-  return stage;
+Stage settle(const SearchInput& input, const EnlargedParameters& parameters) {
+  const auto predicted = predict_means_V(input.log, parameters);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
+  const Eigen::Index n = predicted[0].size();
+  PerAxis<PooledNoise> noise;
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    const Eigen::MatrixXd design =
+        independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
+    const Eigen::VectorXd residual = input.observed.mean_V[i] - predicted[i];
+    noise[i] =
+        best_pool(input.noise[i], input.windows, residual, design, input.extra_variance_V2[i])
+            .pooled();
+  });
+  return stage_with(input, parameters, std::move(noise));
 }
 
 // How many independent looks the search amounts to: the best p-value of a search over pure noise
 // is that of the best of so many.
-double effective_looks(const CandidateDirections& directions, std::size_t candidates,
-                       Eigen::Index rows, const SearchOptions& options) {
+double effective_looks(const CandidateGains& gains_of, std::size_t candidates, Eigen::Index rows,
+                       const SearchOptions& options) {
   std::mt19937_64 generator(options.seed);
   std::normal_distribution<double> normal;
   Eigen::MatrixXd noise(rows, options.replicates);
   for (double& value : noise.reshaped()) value = normal(generator);
-  const Eigen::MatrixXd gains = directions.gains(directions.project(noise));
+  const Eigen::MatrixXd gains = gains_of.of(gains_of.project(noise));
   double sum = 0;
   for (Eigen::Index r = 0; r < gains.cols(); ++r) {
     double best = 0;
     for (std::size_t c = 0; c < candidates; ++c) {
-      if (directions.dof(c) == 0) continue;
+      if (gains_of.dof(c) == 0) continue;
       best = std::min(
-          best, log_chi_squared_tail(gains(static_cast<Eigen::Index>(c), r), directions.dof(c)));
+          best, log_chi_squared_tail(gains(static_cast<Eigen::Index>(c), r), gains_of.dof(c)));
     }
     sum += std::log1p(-std::exp(std::min(best, -1e-12)));
   }
@@ -98,7 +120,8 @@ double effective_looks(const CandidateDirections& directions, std::size_t candid
 }
 
 double p_of_search(double log_p_local, double looks) {
-  return -std::expm1(-looks * std::exp(log_p_local));
+  // Smaller than any double holds is still not zero.
+  return std::max(-std::expm1(-looks * std::exp(log_p_local)), 1e-300);
 }
 
 struct Scored {
@@ -108,15 +131,14 @@ struct Scored {
 };
 
 // Best hypothesis of each family by the first-order gain, best family first.
-std::vector<Scored> screen(const CandidateList& list, const CandidateDirections& directions,
+std::vector<Scored> screen(const CandidateList& list, const CandidateGains& gains_of,
                            const Eigen::VectorXd& gains) {
   std::vector<Scored> best(list.family_size.size(),
                            {0, 0, std::numeric_limits<double>::infinity()});
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
-    if (directions.dof(c) == 0) continue;
+    if (gains_of.dof(c) == 0) continue;
     const std::size_t family = list.candidates[c].family;
-    const double log_p =
-        log_chi_squared_tail(gains(static_cast<Eigen::Index>(c)), directions.dof(c));
+    const double log_p = log_chi_squared_tail(gains(static_cast<Eigen::Index>(c)), gains_of.dof(c));
     const double score = log_p + std::log(static_cast<double>(list.family_size[family])) +
                          list.candidates[c].handicap;
     if (score < best[family].score) best[family] = {c, log_p, score};
@@ -138,24 +160,23 @@ SearchResult search_effects(const SearchInput& input, const CandidateList& list,
                             const SearchOptions& options) {
   constexpr std::size_t kRefined = 10;  // families that are refitted in full at each step
   SearchResult result;
-  Stage stage = settle(input, input.start, nullptr);
+  Stage stage = input.pooled != nullptr ? stage_with(input, input.start, *input.pooled)
+                                        : settle(input, input.start);
   std::vector<Candidate> chosen;
   std::vector<double> p_values;
   double looks = 1;
 
   while (true) {
-    const CandidateDirections directions(input.log, list, stage.whitening, stage.fit);
-    const Eigen::VectorXd gains = directions.gains(stage.fit.whitened_residual).col(0);
-    std::vector<Scored> ranked = screen(list, directions, gains);
+    const CandidateResponses responses =
+        candidate_responses(input.log, list, stage.whitening, stage.fit.parameters);
+    const CandidateGains gains_of(responses, stage.fit);
+    const Eigen::VectorXd gains = gains_of.of(stage.fit.whitened_residual).col(0);
+    const std::vector<Scored> ranked = screen(list, gains_of, gains);
     if (ranked.empty()) break;
-    if (chosen.empty()) {
-      // The number of looks hardly changes while the model grows.
-      looks = effective_looks(directions, list.candidates.size(),
-                              stage.fit.whitened_residual.size(), options);
-      for (const Scored& s : ranked) {
-        result.ranking.push_back({list.candidates[s.candidate], s.score / std::log(10.0)});
-      }
-    }
+    // The number of looks hardly changes while the model grows.
+    if (chosen.empty())
+      looks = effective_looks(gains_of, list.candidates.size(), stage.fit.whitened_residual.size(),
+                              options);
     const double best_log_p =
         std::min_element(ranked.begin(), ranked.end(), [](const Scored& a, const Scored& b) {
           return a.log_p < b.log_p;
@@ -170,10 +191,10 @@ SearchResult search_effects(const SearchInput& input, const CandidateList& list,
     for (std::size_t k = 0; k < std::min(kRefined, ranked.size()); ++k) {
       const Scored& s = ranked[k];
       EnlargedFit fit =
-          fit_enlarged(input.log, input.mean_V, stage.whitening,
+          fit_enlarged(input.log, input.observed, stage.whitening,
                        with_effect(stage.fit.parameters, list.candidates[s.candidate].active()));
       if (!fit.determined) continue;
-      const double dof = directions.dof(s.candidate);
+      const double dof = gains_of.dof(s.candidate);
       const double log_p = log_chi_squared_tail(stage.fit.chi2 - fit.chi2, dof);
       const double score = log_p + (s.score - s.log_p);
       if (score < winner_score) {
@@ -186,28 +207,28 @@ SearchResult search_effects(const SearchInput& input, const CandidateList& list,
     if (winner == nullptr || p_of_search(winner_log_p, looks) > options.false_alarm) break;
     chosen.push_back(list.candidates[winner->candidate]);
     p_values.push_back(p_of_search(winner_log_p, looks));
-    stage = settle(input, winner_fit.parameters, &stage);
+    stage = settle(input, winner_fit.parameters);
 
     // Backward: what the newcomer has made superfluous goes.
     for (std::size_t k = chosen.size(); k-- > 0 && chosen.size() > 1;) {
       EnlargedParameters without = stage.fit.parameters;
       without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(k));
-      const EnlargedFit fit = fit_enlarged(input.log, input.mean_V, stage.whitening, without);
+      const EnlargedFit fit = fit_enlarged(input.log, input.observed, stage.whitening, without);
       const auto free =
           static_cast<double>(stage.fit.parameters.free_count() - without.free_count());
       const double log_p = log_chi_squared_tail(fit.chi2 - stage.fit.chi2, std::max(1.0, free));
       if (p_of_search(log_p, looks) < options.false_alarm) continue;
       chosen.erase(chosen.begin() + static_cast<std::ptrdiff_t>(k));
       p_values.erase(p_values.begin() + static_cast<std::ptrdiff_t>(k));
-      stage = settle(input, without, &stage);
+      stage = settle(input, fit.parameters);
     }
   }
 
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     EnlargedParameters without = stage.fit.parameters;
     without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(k));
-    const EnlargedFit fit = fit_enlarged(input.log, input.mean_V, stage.whitening, without);
-    result.evidence.push_back({chosen[k], fit.chi2 - stage.fit.chi2, 0, p_values[k]});
+    const EnlargedFit fit = fit_enlarged(input.log, input.observed, stage.whitening, without);
+    result.evidence.push_back({chosen[k], fit.chi2 - stage.fit.chi2, p_values[k]});
   }
   result.fit = std::move(stage.fit);
   result.noise = std::move(stage.noise);

@@ -24,25 +24,20 @@ struct SearchOptions {
 /// The data of a search; n visits.
 struct SearchInput {
   const VisitLog& log;
-  const PerAxis<Eigen::VectorXd>& mean_V;  ///< n pose means
+  const Observations& observed;
   const PerAxis<NoiseModel>& noise;
   const std::vector<SampleWindow>& windows;           ///< n
   const PerAxis<Eigen::VectorXd>& extra_variance_V2;  ///< n known variances (positioning), or empty
   EnlargedParameters start;                           ///< the 12 parameters, no effects
+  /// Noise beside the 12 parameters when it is known already; null: the search finds it.
+  const PerAxis<PooledNoise>* pooled = nullptr;
 };
 
 /// One effect in the model, and what speaks for it.
 struct Evidence {
   Candidate candidate;
   double chi2_gain = 0;  ///< loss of fit when it alone is taken out of the final model
-  double p_local = 1;    ///< of its own family
   double p_value = 1;    ///< of the whole search
-};
-
-/// A hypothesis compared in the first step, for the picture of the ten best.
-struct RankedCandidate {
-  Candidate candidate;
-  double log10_p = 0;
 };
 
 struct SearchResult {
@@ -50,8 +45,7 @@ struct SearchResult {
   std::vector<Evidence> evidence;
   PerAxis<PooledNoise> noise;  ///< re-estimated under the final model
   PoseWhitening whitening;
-  std::vector<RankedCandidate> ranking;  ///< of the first step, best first, one per family
-  double p_best_rest = 1;                ///< p-value of the best candidate that was not taken
+  double p_best_rest = 1;  ///< p-value of the best candidate that was not taken
 };
 
 /// Deterministic in input and options.

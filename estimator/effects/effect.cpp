@@ -8,6 +8,10 @@ void Effect::displace(const VisitLog&, std::size_t, const double*, HeadGeometry&
 
 double Effect::term_g(const TermInput&, const double*) const { return 0; }
 
+double Effect::sample_term_g(const TermInput& input, const double* p, double) const {
+  return term_g(input, p);
+}
+
 namespace effect {
 
 double mean_decay(const Visit& visit, double origin_s, double tau_s) {

@@ -69,6 +69,11 @@ class Effect {
                         HeadGeometry& head) const;
   /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
   virtual double term_g(const TermInput& input, const double* p) const;
+  /// Whether the term changes while the head rests; sample_term_g() says how.
+  virtual bool within_dwell() const { return false; }
+  /// Sensor: the term `since_arrival_s` after the first sample of the visit, g.
+  virtual double sample_term_g(const TermInput& input, const double* p,
+                               double since_arrival_s) const;
   /// What belonged to one run only does not carry over to another set of the same unit.
   virtual bool carries_over() const { return true; }
 };

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
@@ -22,10 +24,19 @@ class Settling final : public Effect {
     return starts;
   }
   double term_g(const TermInput& input, const double* p) const override {
+    return p[0] * came_from_g(input) * effect::mean_decay(input.at(), input.at().t_arrival_s, p[1]);
+  }
+  bool within_dwell() const override { return true; }
+  double sample_term_g(const TermInput& input, const double* p,
+                       double since_arrival_s) const override {
+    return p[0] * came_from_g(input) * std::exp(-since_arrival_s / p[1]);
+  }
+
+ private:
+  static double came_from_g(const TermInput& input) {
     if (input.visit == 0) return 0;
     const auto i = static_cast<Eigen::Index>(input.axis);
-    const double step = input.a_g[input.visit - 1](i) - input.a_g[input.visit](i);
-    return p[0] * step * effect::mean_decay(input.at(), input.at().t_arrival_s, p[1]);
+    return input.a_g[input.visit - 1](i) - input.a_g[input.visit](i);
   }
 };
 

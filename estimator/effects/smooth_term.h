@@ -11,20 +11,28 @@
 namespace plumbline {
 
 /// What a smooth term changes.
-enum class TermForm { bias, scale, geometry };
+enum class TermForm { bias, scale, geometry, sample };
 const char* to_string(TermForm form);
 
-/// A polynomial (Legendre, degree 1 … d) or, for the spindle angle, a harmonic series (order
-/// 1 … d) in one variable. The range in which the variable was seen is part of its parameters, so
-/// that it means the same on another set; beyond that range it is held.
+/// A function of one variable with free coefficients: a polynomial, a harmonic series, a wave, or a
+/// course over the dwell; of the variable as it is or of what it was on average lately. The range
+/// in which the variable was seen is part of its parameters, so that it means the same on another
+/// set; beyond that range a polynomial is held.
 class SmoothTerm : public Effect {
  public:
   virtual const std::string& driver() const = 0;  ///< "t_s", "rh_pct", "temp_C.rate" …
   virtual TermForm form() const = 0;
-  virtual std::string shape() const = 0;  ///< "polynomial of degree 2" …
+  /// "polynomial of degree 2" …; with driver and form it says which term this is.
+  virtual std::string shape() const = 0;
 };
 
-/// All smooth terms that can be formed on these visits: for every variable, form and degree.
-std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log);
+/// Which of them make sense: a search wants those that these visits can show, a model that is read
+/// back wants any.
+enum class SmoothTermSelection { shown_by_these_visits, any };
+
+/// The smooth terms for every variable, form and shape. They hold the variables at the visits of
+/// `log` and can be used with that log only.
+std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
+                                                      SmoothTermSelection selection);
 
 }  // namespace plumbline

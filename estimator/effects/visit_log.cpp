@@ -43,6 +43,23 @@ double smallest_step(std::vector<double> u) {
 
 }  // namespace
 
+Eigen::MatrixXd dwell_contrasts(std::size_t samples) {
+  const auto n = static_cast<Eigen::Index>(samples);
+  Eigen::MatrixXd contrasts = Eigen::MatrixXd::Zero(n, kDwellContrasts);
+  Eigen::Index used = 0, edge = 0;
+  for (int halvings = static_cast<int>(kDwellContrasts); halvings > 0; --halvings) {
+    const Eigen::Index next = n >> halvings;
+    if (next <= edge) continue;
+    edge = next;
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
+    step.head(edge).setOnes();
+    step.array() -= step.mean();
+    for (Eigen::Index k = 0; k < used; ++k) step -= contrasts.col(k).dot(step) * contrasts.col(k);
+    contrasts.col(used++) = step.normalized();
+  }
+  return contrasts;
+}
+
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {
   assert(set.has_angles);
   const SampleTable& samples = set.samples;
@@ -60,6 +77,8 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     visit.delta_rad = pose.delta_deg * kRadPerDeg;
     visit.h_rad = pose.h_deg * kRadPerDeg;
     visit.count = pose.count;
+    if (!log.contrasts.contains(pose.count))
+      log.contrasts.emplace(pose.count, dwell_contrasts(pose.count));
     visit.t_arrival_s = samples.t_s[pose.first];
     visit.step_s = pose.count > 1 ? (samples.t_s[pose.first + pose.count - 1] - visit.t_arrival_s) /
                                         static_cast<double>(pose.count - 1)
@@ -78,6 +97,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     for (const Covariate& covariate : samples.covariates) {
       visit.covariate.push_back(mean_of(covariate.value, pose));
     }
+    for (std::size_t i = 0; i < kAxisCount; ++i) visit.mean_V[i] = mean_of(samples.u_V[i], pose);
     log.visits.push_back(std::move(visit));
   }
   // Before the first turn the head came from its home position, like for that turn.
@@ -95,19 +115,6 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.highest_V[i] = *high;
   }
   return log;
-}
-
-Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma) {
-  const double ch = std::cos(head.h_rad), sh = std::sin(head.h_rad);
-  const double cd = std::cos(head.delta_rad), sd = std::sin(head.delta_rad);
-  const double ce = std::cos(head.roll_rad), se = std::sin(head.roll_rad);
-  const double cn = std::cos(head.skew_rad), sn = std::sin(head.skew_rad);
-  // The plumb line along the triad's axes at δ = 0: x and y in the plane of the turntable, z along
-  // the spindle.
-  const double up_x = ch * ce;
-  const double up_y = sn * sh * ce - cn * se;
-  const double up_z = cn * sh * ce + sn * se;
-  return gamma * Eigen::Vector3d(up_x * cd + up_y * sd, -up_x * sd + up_y * cd, up_z);
 }
 
 }  // namespace plumbline

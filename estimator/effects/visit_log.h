@@ -4,9 +4,11 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <vector>
 
+#include "estimator/kinematics.h"
 #include "estimator/measurement.h"
 
 namespace plumbline {
@@ -22,6 +24,7 @@ struct Visit {
   double temperature_K = 0;  ///< mean of T − T₀; 0 when not recorded
   int delta_direction = 0;   ///< sign of the last turn of δ that led here; 0 if δ never turned
   std::vector<double> covariate;  ///< mean over the dwell
+  PerAxis<double> mean_V{};       ///< of the readings
 };
 
 /// The visits in order and what holds for all of them.
@@ -34,24 +37,22 @@ struct VisitLog {
   PerAxis<double> smallest_step_V{};         ///< smallest difference between two different readings
   PerAxis<double> lowest_V{}, highest_V{};   ///< of all readings
   std::optional<Adc> adc;
+  /// dwell_contrasts() of every number of samples that occurs.
+  std::map<std::size_t, Eigen::MatrixXd> contrasts;
 
   double first_s() const { return visits.front().t_arrival_s; }
   double last_s() const { return visits.back().t_mean_s; }
 };
 
+/// How many numbers describe the course of a dwell beside its mean.
+inline constexpr Eigen::Index kDwellContrasts = 5;
+
+/// What is looked for within a dwell of `samples` samples: samples × 5, orthonormal columns of zero
+/// sum. They span the steps after 1/32, 1/16 … 1/2 of the dwell, finest where transients after a
+/// move are fastest; columns that a short dwell cannot resolve are zero.
+Eigen::MatrixXd dwell_contrasts(std::size_t samples);
+
 /// Precondition: the set has angles, and every pose has a sample.
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description);
-
-/// Head and base with their errors at one visit.
-struct HeadGeometry {
-  double delta_rad = 0;
-  double h_rad = 0;
-  double roll_rad = 0;  ///< of the base about x_b
-  double skew_rad = 0;  ///< of the spindle against the normal of the tilt axis
-};
-
-/// Specific force in the sensor frame, standard g. With zero roll and skew this is
-/// γ·(cos h cos δ, −cos h sin δ, sin h).
-Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma);
 
 }  // namespace plumbline

@@ -165,11 +165,17 @@ PooledNoise NoisePool::pool() const {
   PooledNoise result;
   result.power = start_;
   result.power.head<kVarianceTerms>() = best.power;
-  result.information.topLeftCorner<4, 4>() = expected_information(best.power);
   result.walk_decay_per_s = model_.walk_decay_per_s;
   result.covariance = covariance(result.power);
   result.deviance = best.deviance;
   result.converged = best.converged;
+  return result;
+}
+
+PooledNoise NoisePool::pooled_with_information() const {
+  PooledNoise result = pooled_;
+  result.information.topLeftCorner<kVarianceTerms, kVarianceTerms>() =
+      expected_information(result.power.head<kVarianceTerms>());
   return result;
 }
 

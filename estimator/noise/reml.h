@@ -13,7 +13,8 @@ namespace plumbline {
 /// What is known of the noise of the run's window means.
 struct PooledNoise {
   NoisePowers power = NoisePowers::Zero();                  ///< [Q² N² B² K² R²]
-  NoisePowerMatrix information = NoisePowerMatrix::Zero();  ///< of both sources about them
+  /// Of both sources about the powers; filled by NoisePool::pooled_with_information() only.
+  NoisePowerMatrix information = NoisePowerMatrix::Zero();
   double walk_decay_per_s = 0;  ///< of K: whether it is a walk or bounded
   Eigen::MatrixXd covariance;   ///< n×n of the window means with these powers
   double deviance = 0;          ///< −2 ln of the restricted likelihood but for a constant
@@ -36,6 +37,8 @@ class NoisePool {
 
   /// Maximum over both sources.
   const PooledNoise& pooled() const { return pooled_; }
+  /// The same with the information about the powers, which costs two products of n×n matrices.
+  PooledNoise pooled_with_information() const;
   /// The model that was given, with the pooled coefficients.
   NoiseModel model() const;
 

@@ -1,0 +1,133 @@
+#include "estimator/effects/driver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "estimator/kinematics.h"
+
+namespace plumbline {
+namespace {
+
+using ValueAtVisit = std::function<double(std::size_t visit)>;
+
+PerAxis<std::vector<double>> for_all_axes(const VisitLog& log, const ValueAtVisit& value) {
+  std::vector<double> values(log.visits.size());
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = value(k);
+  return {values, values, values};
+}
+
+std::vector<double> specific_force_component_g(const VisitLog& log, std::size_t axis) {
+  std::vector<double> a_g;
+  for (const Visit& visit : log.visits)
+    a_g.push_back(specific_force_g({visit.delta_rad, visit.h_rad},
+                                   log.gamma)(static_cast<Eigen::Index>(axis)));
+  return a_g;
+}
+
+// Slope between the neighbours of a visit, per hour.
+std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& value) {
+  std::vector<double> rate(value.size());
+  for (std::size_t k = 0; k < value.size(); ++k) {
+    const std::size_t before = k == 0 ? 0 : k - 1;
+    const std::size_t after = std::min(k + 1, value.size() - 1);
+    const double span_s = log.visits[after].t_mean_s - log.visits[before].t_mean_s;
+    rate[k] = span_s > 0 ? 3600 * (value[after] - value[before]) / span_s : 0;
+  }
+  return rate;
+}
+
+// Average of the past with weight exp(−age/τ). Between two visits a column is taken to change
+// evenly, an attitude to be the earlier one.
+std::vector<double> remembered(const VisitLog& log, const std::vector<double>& value, double tau_s,
+                               bool attitude) {
+  std::vector<double> state(value.size(), value.empty() ? 0 : value.front());
+  for (std::size_t k = 1; k < value.size(); ++k) {
+    const double kept = std::exp(-(log.visits[k].t_mean_s - log.visits[k - 1].t_mean_s) / tau_s);
+    const double between = attitude ? value[k - 1] : 0.5 * (value[k - 1] + value[k]);
+    state[k] = kept * state[k - 1] + (1 - kept) * between;
+  }
+  return state;
+}
+
+struct Column {
+  std::string name;
+  std::vector<double> value;
+};
+
+std::vector<Column> recorded_columns(const VisitLog& log) {
+  std::vector<Column> columns;
+  if (log.has_temperature) {
+    Column& temperature = columns.emplace_back(Column{"temp_C", {}});
+    for (const Visit& visit : log.visits) temperature.value.push_back(visit.temperature_K);
+  }
+  for (std::size_t c = 0; c < log.covariate_names.size(); ++c) {
+    Column& column = columns.emplace_back(Column{log.covariate_names[c], {}});
+    for (const Visit& visit : log.visits) column.value.push_back(visit.covariate[c]);
+  }
+  return columns;
+}
+
+}  // namespace
+
+bool Driver::varies() const {
+  return std::any_of(value.begin(), value.end(), [](const std::vector<double>& v) {
+    const auto [low, high] = std::minmax_element(v.begin(), v.end());
+    return low != v.end() && *high > *low;
+  });
+}
+
+std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
+  const auto& visits = log.visits;
+  std::vector<Driver> drivers;
+  const auto add = [&](std::string name, const ValueAtVisit& value) -> Driver& {
+    return drivers.emplace_back(Driver{std::move(name), "", for_all_axes(log, value)});
+  };
+  add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; });
+  add("delta_deg", [&](std::size_t k) { return visits[k].delta_rad; }).angle = true;
+  add("h_deg", [&](std::size_t k) { return visits[k].h_rad; });
+  PerAxis<std::vector<double>> a_g, before_g;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    a_g[i] = specific_force_component_g(log, i);
+    before_g[i] = a_g[i];
+    std::rotate(before_g[i].rbegin(), before_g[i].rbegin() + 1, before_g[i].rend());
+    if (!before_g[i].empty()) before_g[i].front() = a_g[i].front();
+    drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g[i], a_g[i], a_g[i]}});
+  }
+  drivers.push_back({"previous_pose", "a_i there", before_g});
+  add("previous_pose", [&](std::size_t k) {
+    if (k == 0) return 0.0;
+    return std::remainder(visits[k].delta_rad - visits[k - 1].delta_rad, 2 * std::numbers::pi);
+  }).past = "turn of delta since";
+  add("previous_pose", [&](std::size_t k) {
+    return k == 0 ? 0.0 : visits[k].h_rad - visits[k - 1].h_rad;
+  }).past = "change of h since";
+  for (const Column& column : recorded_columns(log)) {
+    add(column.name, [&](std::size_t k) { return column.value[k]; }).recorded = true;
+    const std::vector<double> rate = rate_per_h(log, column.value);
+    add(column.name + ".rate", [&](std::size_t k) { return rate[k]; }).recorded = true;
+  }
+  return drivers;
+}
+
+std::vector<Driver> remembered_drivers(const VisitLog& log) {
+  std::vector<Driver> drivers;
+  PerAxis<std::vector<double>> a_g;
+  for (std::size_t i = 0; i < kAxisCount; ++i) a_g[i] = specific_force_component_g(log, i);
+  const std::vector<Column> columns = recorded_columns(log);
+  for (const double tau_s : kMemory_s) {
+    const std::string past =
+        "average of the past, time constant " + std::to_string(static_cast<int>(tau_s)) + " s";
+    Driver& attitude = drivers.emplace_back(Driver{"previous_pose", past, {}});
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      attitude.value[i] = remembered(log, a_g[i], tau_s, true);
+    for (const Column& column : columns) {
+      const std::vector<double> value = remembered(log, column.value, tau_s, false);
+      drivers.push_back({column.name, past, {value, value, value}, false, true});
+    }
+  }
+  return drivers;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,30 @@
+// The variables that may drive a residual, at every visit of a log.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "estimator/effects/visit_log.h"
+
+namespace plumbline {
+
+/// One variable; a few (where an axis was before) differ from axis to axis.
+struct Driver {
+  std::string name;                    ///< as in result.json
+  std::string past;                    ///< how its past enters, in words; empty: not at all
+  PerAxis<std::vector<double>> value;  ///< per axis and visit
+  bool angle = false;                  ///< periodic in 2π
+  bool recorded = false;               ///< a column of the measurement file
+  bool varies() const;
+};
+
+/// Time, angles, the specific force, what came before, and every recorded column with its rate of
+/// change.
+std::vector<Driver> instantaneous_drivers(const VisitLog& log);
+
+/// What recorded columns and the specific force of the own axis were on average lately, weighted by
+/// exp(−age/τ), for the time constants of kMemory_s.
+std::vector<Driver> remembered_drivers(const VisitLog& log);
+inline constexpr double kMemory_s[] = {30, 60, 120, 300, 600, 1200, 2400, 4800};
+
+}  // namespace plumbline
