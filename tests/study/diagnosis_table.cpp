@@ -50,7 +50,7 @@ std::string share_text(const Share& s) {
 /// All that a group of sets shows.
 struct Tally {
   Share named, stated, additional, wrong, unlisted_instead, driver, not_listed, coverage, K, U0,
-      found_any, worse;
+      found_any, unexplained, worse;
   std::vector<double> fresh, heldout, seconds;
   int infeasible = 0, undetectable = 0;
 
@@ -65,6 +65,8 @@ struct Tally {
     };
     yes_no(additional, o.additional() > 0);
     yes_no(found_any, o.wrong + o.named_or_stated + o.driver_right > 0);
+    yes_no(unexplained,
+           o.verdict == Verdict::unexplained || o.verdict == Verdict::partly_explained);
     yes_no(worse,
            o.after.fresh > 1.02 * o.before.fresh || o.after.heldout > 1.02 * o.before.heldout);
     seconds.push_back(o.seconds);
@@ -170,6 +172,7 @@ std::string summary(const std::vector<SetOutcome>& outcomes, double detectable_s
       "share  [95 % limits]    n\n",
       outcomes.size(), all.infeasible, all.undetectable, detectable_sigma);
   line("an effect or a structure claimed", all.found_any);
+  line("left unexplained, wholly or partly", all.unexplained);
   line("named right (id and axes)", all.named);
   line("named right or among the stated, or driver right", all.stated);
   line("a wrong finding", all.wrong);
