@@ -3,6 +3,7 @@
 
 #include "app/calibration_job.h"
 #include "app/command/command.h"
+#include "app/scalar_job.h"
 
 namespace plumbline::app {
 
@@ -15,6 +16,7 @@ struct CalibrateOptions {
   std::string out;
   std::uint64_t seed = 1;
   bool scalar = false;
+  ScalarFiles scalar_files;
 };
 
 Result<CalibrationJob> job_of(const CalibrateOptions& options) {
@@ -29,11 +31,22 @@ Result<CalibrationJob> job_of(const CalibrateOptions& options) {
   return job_from_files(options.files, options.seed);
 }
 
-Result<ExitCode> run_calibrate(const CalibrateOptions& options) {
-  if (options.scalar) {
-    return fail(ErrorCode::input,
-                "--scalar: calibration without angles is not in this version yet");
+Result<ExitCode> run_scalar(const CalibrateOptions& options) {
+  if (options.files.samples.empty() || options.files.config.empty()) {
+    return fail(ErrorCode::input, "calibrate --scalar needs --samples and --config");
   }
+  ScalarFiles files = options.scalar_files;
+  files.samples = options.files.samples;
+  files.config = options.files.config;
+  files.skip_bad_rows = options.files.skip_bad_rows;
+  const auto outcome = calibrate_scalar_files(files, options.out, options.seed);
+  if (!outcome) return fail(outcome.error());
+  std::cout << outcome->summary;
+  return outcome->exit_code;
+}
+
+Result<ExitCode> run_calibrate(const CalibrateOptions& options) {
+  if (options.scalar) return run_scalar(options);
   const auto job = job_of(options);
   if (!job) return fail(job.error());
   const auto outcome = perform(*job, options.out);
@@ -70,7 +83,25 @@ void add_calibrate(CLI::App& program, Invocation& invocation) {
                   "Folder for result.json and the certificate; created when absent")
       ->required();
   sub->add_option("--seed", options->seed, "Seed of everything random (default 1)");
-  sub->add_flag("--scalar", options->scalar, "Calibrate without angles (not in this version yet)");
+  auto* scalar =
+      sub->add_flag("--scalar", options->scalar,
+                    "Calibrate without angles, from |a| = g at rest in many attitudes (nine "
+                    "parameters; with angles in the file the head is cross-checked)")
+          ->needs(samples)
+          ->needs(config)
+          ->excludes(static_record);
+  sub->add_option("--columns", options->scalar_files.columns,
+                  "With --scalar: which column is which axis, as in x=ax_raw,y=ay_raw,z=az_raw "
+                  "(default x=ux_V,y=uy_V,z=uz_V)")
+      ->needs(scalar);
+  sub->add_flag("--detect-static", options->scalar_files.detect_static,
+                "With --scalar: cut a continuous record into rests; at rest is where, " +
+                    rest_detector_words())
+      ->needs(scalar);
+  sub->add_option("--rate", options->scalar_files.rate_hz,
+                  "With --scalar: sample rate in Hz of a file without the column t_s")
+      ->needs(scalar)
+      ->check(CLI::PositiveNumber);
   sub->footer(
       "With --run, verification poses of the run are evaluated too (evaluation.json). The folder "
       "receives all files or, on failure, none.\n"

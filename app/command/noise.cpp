@@ -4,8 +4,8 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <sstream>
 
+#include "app/axis_columns.h"
 #include "app/certificate/rounding.h"
 #include "app/command/command.h"
 #include "app/figure/allan_figure.h"
@@ -27,45 +27,6 @@ struct NoiseOptions {
   std::string unit;
   double rate_hz = 0;
 };
-
-struct AxisColumn {
-  std::string axis;
-  std::string column;
-};
-
-/// "x=ax_lsb,z=az_lsb"
-Result<std::vector<AxisColumn>> parse_columns(const std::string& text) {
-  std::vector<AxisColumn> columns;
-  std::istringstream parts(text);
-  for (std::string part; std::getline(parts, part, ',');) {
-    const auto equals = part.find('=');
-    const AxisColumn column{part.substr(0, equals),
-                            equals == std::string::npos ? "" : part.substr(equals + 1)};
-    const bool known =
-        std::find(kAxisName.begin(), kAxisName.end(), column.axis) != kAxisName.end();
-    const bool again = std::any_of(columns.begin(), columns.end(), [&](const AxisColumn& other) {
-      return other.axis == column.axis;
-    });
-    if (!known || again || column.column.empty()) {
-      return fail(ErrorCode::input,
-                  fmt::format("--columns: \"{}\" is not AXIS=COLUMN with each of x, y, z at most "
-                              "once",
-                              part));
-    }
-    columns.push_back(column);
-  }
-  if (columns.empty()) return fail(ErrorCode::input, "--columns names no column");
-  return columns;
-}
-
-/// The unit that a column's name ends in: "ux_V" is in V.
-std::string unit_of(const std::string& column) {
-  const auto underscore = column.rfind('_');
-  std::string suffix = underscore == std::string::npos ? "" : column.substr(underscore + 1);
-  if (suffix == "V" || suffix == "g") return suffix;
-  if (suffix == "mps2") return "m/s^2";
-  return suffix == "lsb" || suffix == "raw" ? "LSB" : "unit";
-}
 
 /// Mean rate of a record; refuses gaps, because the curves of an uneven record mean nothing.
 Result<double> rate_of(const std::string& name, const std::vector<double>& t_s) {
@@ -100,7 +61,7 @@ std::string summary_line(const NoiseChannel& channel) {
 }
 
 Result<ExitCode> run_noise(const NoiseOptions& options) {
-  const auto columns = parse_columns(options.columns);
+  const auto columns = parse_axis_columns(options.columns);
   if (!columns) return fail(columns.error());
   std::vector<std::string> names;
   for (const AxisColumn& column : *columns) names.push_back(column.column);
@@ -125,7 +86,7 @@ Result<ExitCode> run_noise(const NoiseOptions& options) {
     for (double& value : values) value *= options.scale;
     const AxisColumn& column = (*columns)[i];
     std::string unit = options.unit;
-    if (unit.empty()) unit = options.scale == 1 ? unit_of(column.column) : "unit";
+    if (unit.empty()) unit = options.scale == 1 ? unit_of_column(column.column) : "unit";
     report.channels.push_back({.axis = column.axis,
                                .column = column.column,
                                .unit = unit,

@@ -3,6 +3,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "app/io/diagnosis_json.h"
+
 namespace plumbline::app {
 
 namespace {
@@ -47,78 +49,6 @@ Json to_json(const NoiseModel& noise) {
           {"adequate", noise.adequate}};
 }
 
-Json json_parameters(const std::vector<EffectParameter>& reported) {
-  Json parameters = Json::array();
-  for (const EffectParameter& parameter : reported) {
-    parameters.push_back(
-        {{"name", parameter.name},
-         {"axis", parameter.axis ? Json(kAxisName.at(*parameter.axis)) : Json(nullptr)},
-         {"value", json_number(parameter.value)},
-         {"u", json_number(parameter.u)},
-         {"unit", parameter.unit}});
-  }
-  return parameters;
-}
-
-Json to_json(const FoundEffect& effect) {
-  return {{"id", effect.id},
-          {"axes", json_axis_names(effect.axes)},
-          {"parameters", json_parameters(effect.parameters)},
-          {"p_value", json_number(effect.p_value)},
-          {"heldout_gain", json_number(effect.heldout_gain)},
-          {"alternatives", effect.alternatives},
-          {"separate_by", effect.separate_by}};
-}
-
-Json to_json(const UnlistedStructure& structure) {
-  return {{"driver", structure.driver},
-          {"form", structure.form},
-          {"axes", json_axis_names(structure.axes)},
-          {"shape", structure.shape},
-          {"parameters", json_parameters(structure.parameters)},
-          {"p_value", json_number(structure.p_value)},
-          {"heldout_gain", json_number(structure.heldout_gain)}};
-}
-
-Json to_json(const Diagnosis& diagnosis) {
-  Json effects = Json::array();
-  for (const FoundEffect& effect : diagnosis.effects) effects.push_back(to_json(effect));
-  Json unlisted = Json::array();
-  for (const UnlistedStructure& structure : diagnosis.unlisted) {
-    unlisted.push_back(to_json(structure));
-  }
-  const Json tests = json_per_axis([&](std::size_t axis) -> Json {
-    const ResidualTest& test = diagnosis.axis_test[axis];
-    return {{"statistic", json_number(test.statistic)},
-            {"dof", json_number(test.dof)},
-            {"p_value", json_number(test.p_value)}};
-  });
-  return {{"verdict", to_string(diagnosis.verdict)},
-          {"reason", diagnosis.reason},
-          {"p_value", json_number(diagnosis.p_value)},
-          {"residual_test", tests},
-          {"effects", std::move(effects)},
-          {"unlisted", std::move(unlisted)}};
-}
-
-Json to_json(const ErrorFigures& error) {
-  return {{"fit_pose_rms", json_array(error.fit_pose_rms_mps2)},
-          {"heldout_pose_rms", json_array(error.heldout_pose_rms_mps2)},
-          {"heldout_pose_max_abs", json_array(error.heldout_pose_max_abs_mps2)},
-          {"sample_rms", json_array(error.sample_rms_mps2)}};
-}
-
-Json to_json(const Decision& decision) {
-  Json json = {{"status", to_string(decision.status)}};
-  if (decision.status == DecisionStatus::none) return json;
-  json["limit_mps2"] = json_number(decision.limit_mps2);
-  json["max_abs_error_mps2"] = json_number(decision.max_abs_error_mps2);
-  json["u_mps2"] = json_number(decision.u_mps2);
-  json["guard_band_mps2"] = json_number(decision.guard_band_mps2);
-  json["rule"] = decision.rule;
-  return json;
-}
-
 }  // namespace
 
 Json result_json(const Calibration& calibration, const Provenance& provenance) {
@@ -137,15 +67,15 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
           {"noise_fit",
            json_per_axis([&](std::size_t axis) { return to_json(calibration.noise[axis]); })},
           {"estimates", to_json(calibration.estimates)},
-          {"diagnosis", to_json(calibration.diagnosis)},
+          {"diagnosis", json_diagnosis(calibration.diagnosis)},
           {"final", to_json(calibration.final)},
           {"error",
-           {{"before", to_json(calibration.before)},
-            {"after", to_json(calibration.after)},
+           {{"before", json_errors(calibration.before)},
+            {"after", json_errors(calibration.after)},
             {"floor",
              {{"pose_rms", json_array(calibration.floor_pose_rms_mps2)},
               {"u_pose_rms", json_array(calibration.u_floor_pose_rms_mps2)}}}}},
-          {"decision", to_json(calibration.decision)}};
+          {"decision", json_decision(calibration.decision)}};
 }
 
 }  // namespace plumbline::app

@@ -61,7 +61,6 @@ Eigen::MatrixXd dwell_contrasts(std::size_t samples) {
 }
 
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {
-  assert(set.has_angles);
   const SampleTable& samples = set.samples;
   VisitLog log;
   log.gamma = description.gravity.local_mps2 / kStandardGravity_mps2;

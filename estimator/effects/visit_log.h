@@ -52,7 +52,7 @@ inline constexpr Eigen::Index kDwellContrasts = 5;
 /// move are fastest; columns that a short dwell cannot resolve are zero.
 Eigen::MatrixXd dwell_contrasts(std::size_t samples);
 
-/// Precondition: the set has angles, and every pose has a sample.
+/// Without angles those of the visits are zero. Precondition: every pose has a sample.
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description);
 
 }  // namespace plumbline

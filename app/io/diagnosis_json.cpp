@@ -1,0 +1,81 @@
+#include "app/io/diagnosis_json.h"
+
+namespace plumbline::app {
+
+namespace {
+
+Json json_parameters(const std::vector<EffectParameter>& reported) {
+  Json parameters = Json::array();
+  for (const EffectParameter& parameter : reported) {
+    parameters.push_back(
+        {{"name", parameter.name},
+         {"axis", parameter.axis ? Json(kAxisName.at(*parameter.axis)) : Json(nullptr)},
+         {"value", json_number(parameter.value)},
+         {"u", json_number(parameter.u)},
+         {"unit", parameter.unit}});
+  }
+  return parameters;
+}
+
+Json to_json(const FoundEffect& effect) {
+  return {{"id", effect.id},
+          {"axes", json_axis_names(effect.axes)},
+          {"parameters", json_parameters(effect.parameters)},
+          {"p_value", json_number(effect.p_value)},
+          {"heldout_gain", json_number(effect.heldout_gain)},
+          {"alternatives", effect.alternatives},
+          {"separate_by", effect.separate_by}};
+}
+
+Json to_json(const UnlistedStructure& structure) {
+  return {{"driver", structure.driver},
+          {"form", structure.form},
+          {"axes", json_axis_names(structure.axes)},
+          {"shape", structure.shape},
+          {"parameters", json_parameters(structure.parameters)},
+          {"p_value", json_number(structure.p_value)},
+          {"heldout_gain", json_number(structure.heldout_gain)}};
+}
+
+}  // namespace
+
+Json json_diagnosis(const Diagnosis& diagnosis) {
+  Json effects = Json::array();
+  for (const FoundEffect& effect : diagnosis.effects) effects.push_back(to_json(effect));
+  Json unlisted = Json::array();
+  for (const UnlistedStructure& structure : diagnosis.unlisted) {
+    unlisted.push_back(to_json(structure));
+  }
+  const Json tests = json_per_axis([&](std::size_t axis) -> Json {
+    const ResidualTest& test = diagnosis.axis_test[axis];
+    return {{"statistic", json_number(test.statistic)},
+            {"dof", json_number(test.dof)},
+            {"p_value", json_number(test.p_value)}};
+  });
+  return {{"verdict", to_string(diagnosis.verdict)},
+          {"reason", diagnosis.reason},
+          {"p_value", json_number(diagnosis.p_value)},
+          {"residual_test", tests},
+          {"effects", std::move(effects)},
+          {"unlisted", std::move(unlisted)}};
+}
+
+Json json_errors(const ErrorFigures& error) {
+  return {{"fit_pose_rms", json_array(error.fit_pose_rms_mps2)},
+          {"heldout_pose_rms", json_array(error.heldout_pose_rms_mps2)},
+          {"heldout_pose_max_abs", json_array(error.heldout_pose_max_abs_mps2)},
+          {"sample_rms", json_array(error.sample_rms_mps2)}};
+}
+
+Json json_decision(const Decision& decision) {
+  Json json = {{"status", to_string(decision.status)}};
+  if (decision.status == DecisionStatus::none) return json;
+  json["limit_mps2"] = json_number(decision.limit_mps2);
+  json["max_abs_error_mps2"] = json_number(decision.max_abs_error_mps2);
+  json["u_mps2"] = json_number(decision.u_mps2);
+  json["guard_band_mps2"] = json_number(decision.guard_band_mps2);
+  json["rule"] = decision.rule;
+  return json;
+}
+
+}  // namespace plumbline::app

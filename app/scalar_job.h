@@ -1,0 +1,44 @@
+// A calibration without angles from its files to its output folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "app/exit_code.h"
+#include "app/provenance.h"
+#include "estimator/scalar/calibrate_scalar.h"
+
+namespace plumbline::app {
+
+struct ScalarFiles {
+  std::filesystem::path samples;
+  std::filesystem::path config;
+  std::string columns;         ///< "x=ax_raw,y=ay_raw,z=az_raw"; empty: ux_V, uy_V, uz_V
+  bool detect_static = false;  ///< cut a continuous record into rests
+  double rate_hz = 0;          ///< of a file without t_s; 0: one reading a second when it has poses
+  bool skip_bad_rows = false;
+};
+
+/// How the rests were found, and in which unit the readings are.
+struct ScalarSource {
+  std::string rests;         ///< one sentence
+  std::string reading_unit;  ///< "V", "g", "LSB" or "unit", from the column's name
+  PerAxis<std::string> columns;
+};
+
+struct ScalarOutcome {
+  ScalarCalibration calibration;
+  ExitCode exit_code = ExitCode::done;
+  std::string summary;  ///< for a person; the last line says what came out
+};
+
+/// Reads, calibrates and writes result.json and certificate.html into `out`: both or, on failure,
+/// none.
+Result<ScalarOutcome> calibrate_scalar_files(const ScalarFiles& files,
+                                             const std::filesystem::path& out, std::uint64_t seed);
+
+/// The detector of rests in words, for help and certificate.
+std::string rest_detector_words();
+
+}  // namespace plumbline::app

@@ -1,0 +1,114 @@
+// `calibrate --scalar` as others use it.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "tests/app/json_schema.h"
+#include "tests/app/program.h"
+#include "tests/app/temp_folder.h"
+
+namespace plumbline::app {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kG = 9.81;
+
+/// Counts of a triad with offset 32000 and 0.0024 m/s² per count, 40 attitudes, `columns` named.
+std::string rows(bool with_pose, const std::string& header) {
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  std::string text = header + "\n";
+  int row = 0;
+  for (int k = 0; k < 40; ++k) {
+    const double z = 2 * (k + 0.5) / 40 - 1, r = std::sqrt(1 - z * z), turn = 2.4 * k;
+    const double a[] = {kG * r * std::cos(turn), kG * r * std::sin(turn), kG * z};
+    for (int i = 0; i < 200; ++i, ++row) {
+      text += fmt::format("{:.2f},", 0.01 * row);
+      if (with_pose) text += fmt::format("{},", k);
+      for (int axis = 0; axis < 3; ++axis) {
+        // Between rests without pose numbers the triad is shaken.
+        const double shake = !with_pose && i < 60 ? 2 * std::sin(0.9 * i + axis) : 0;
+        text += fmt::format("{:.0f}{}", 32000 + (a[axis] + shake) / 0.0024 + 4 * normal(random),
+                            axis < 2 ? "," : "\n");
+      }
+    }
+  }
+  return text;
+}
+
+std::vector<std::string> arguments(const TempFolder& folder, std::vector<std::string> more) {
+  write_text(folder / "run.toml", "[dut]\nserial = \"T-1\"\n[gravity]\nlocal_mps2 = 9.81\n");
+  std::vector<std::string> all = {"calibrate", "--scalar",          "--samples", folder / "s.csv",
+                                  "--config",  folder / "run.toml", "--out",     folder / "out"};
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+void expect_good(const TempFolder& folder, const ProgramOutcome& outcome, double intervals) {
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string text = text_of(folder / "out" / "result.json");
+  EXPECT_EQ(schema_violations("result", text), "");
+  const auto json = nlohmann::json::parse(text);
+  EXPECT_FALSE(json.contains("estimates"));
+  const auto& scalar = json.at("scalar");
+  EXPECT_EQ(scalar.at("intervals"), intervals);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(scalar.at("bias").at(i).get<double>(), 32000, 1);
+    EXPECT_NEAR(scalar.at("scale").at(i).get<double>(), 0.0024, 1e-6);
+  }
+  EXPECT_THAT(text_of(folder / "out" / "certificate.html"), HasSubstr("scalar calibration"));
+}
+
+TEST(ScalarProgram, PosesWithNamedColumns) {
+  const TempFolder folder;
+  write_text(folder / "s.csv", rows(true, "t_s,pose,ax_raw,ay_raw,az_raw"));
+  const auto more = arguments(folder, {"--columns", "x=ax_raw,y=ay_raw,z=az_raw"});
+  expect_good(folder, run_plumbline(more), 40);
+  // Deterministic: the same bytes but for the provenance.
+  auto first = nlohmann::ordered_json::parse(text_of(folder / "out" / "result.json"));
+  ASSERT_EQ(run_plumbline(more).exit_code, 0);
+  auto second = nlohmann::ordered_json::parse(text_of(folder / "out" / "result.json"));
+  first.erase("provenance");
+  second.erase("provenance");
+  EXPECT_EQ(first.dump(), second.dump());
+}
+
+TEST(ScalarProgram, ContinuousRecordIsCutIntoRests) {
+  const TempFolder folder;
+  write_text(folder / "s.csv", rows(false, "t_s,ux_V,uy_V,uz_V"));
+  const auto uncut = run_plumbline(arguments(folder, {}));
+  EXPECT_EQ(uncut.exit_code, 2);
+  EXPECT_THAT(uncut.err, HasSubstr("add --detect-static"));
+  const auto outcome = run_plumbline(arguments(folder, {"--detect-static"}));
+  EXPECT_EQ(outcome.exit_code, 2);  // 1.4 s of rest less the window on both sides: too short
+  EXPECT_THAT(outcome.err, HasSubstr("no interval at rest found"));
+}
+
+TEST(ScalarProgram, BadInputIsOneLineAndCode2) {
+  const TempFolder folder;
+  std::string text = rows(true, "t_s,pose,ux_V,uy_V,uz_V");
+  write_text(folder / "s.csv", text.substr(0, text.find("\n16.00")) + "\n");
+  auto outcome = run_plumbline(arguments(folder, {}));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.error_lines(), 1);
+  EXPECT_THAT(outcome.err, HasSubstr("8 intervals at rest cannot determine nine parameters"));
+
+  text.replace(text.find("\n0.05,0,") + 8, 5, "nan");
+  write_text(folder / "s.csv", text);
+  outcome = run_plumbline(arguments(folder, {}));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("s.csv:7:3 (ux_V): 'nan' is not finite"));
+  EXPECT_EQ(run_plumbline(arguments(folder, {"--skip-bad-rows"})).exit_code, 0);
+
+  outcome = run_plumbline(arguments(folder, {"--columns", "x=ux_V,y=uy_V"}));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("needs all three axes"));
+}
+
+}  // namespace
+}  // namespace plumbline::app
