@@ -185,10 +185,11 @@ CandidateList scalar_candidates(const VisitLog& log) {
     list.owned.push_back(std::move(effect));
     add_candidates(list, log, *list.owned.back());
   }
-  for (auto& term : smooth_terms(log)) {
-    // There is no head; its angles here are only another way to write the attitude.
-    if (term->subject() == Subject::head || term->driver() == "delta_deg" ||
-        term->driver() == "h_deg") {
+  for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
+    // There is no head; its angles here are only another way to write the attitude. What happens
+    // within a rest does not show in its mean.
+    if (term->form() == TermForm::sample || term->subject() == Subject::head || term->driver() == "delta_deg" ||
+        term->driver() == "h_deg" || term->driver().starts_with("code_")) {
       continue;
     }
     list.owned.push_back(std::move(term));
