@@ -17,6 +17,7 @@
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/fit/least_squares.h"
 #include "estimator/fit/recursive_least_squares.h"
+#include "estimator/fit/rounding.h"
 #include "estimator/kinematics.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/identify.h"
@@ -26,6 +27,8 @@
 namespace plumbline {
 namespace {
 
+/// Parameters and rounding depend on each other; the second round changes nothing that is felt.
+constexpr int kRoundingRounds = 3;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// What all axes share.
@@ -33,17 +36,18 @@ struct Experiment {
   const CalibrationInput& input;
   std::vector<PoseMean> poses;
   std::vector<SampleWindow> windows;
-  Eigen::MatrixXd A;        ///< n × 4
-  Eigen::MatrixXd drivers;  ///< n × k, temperature and covariates
+  Eigen::MatrixXd A;          ///< n × 4
+  Eigen::MatrixXd drivers;    ///< n × k, temperature and covariates
+  PerAxis<double> white_V{};  ///< white noise of one reading; negative when unknown
+  NoiseProcesses processes;
 };
-
-using TermCovariances = std::array<Eigen::MatrixXd, kTermCount>;
 
 /// One axis on its way through the engine.
 struct AxisWork {
-  NoiseModel noise;      ///< with the powers that the run, too, supports
-  TermCovariances unit;  ///< of the pose means, per noise term of coefficient 1
-  Eigen::VectorXd y;     ///< pose means, V
+  NoiseModel noise;   ///< with the powers that the run, too, supports
+  NoiseModel record;  ///< what the static record says about the run
+  PooledNoise pooled;
+  Eigen::VectorXd y;  ///< pose means, V
   Eigen::VectorXd positioning_V2;
   Eigen::VectorXd own_V2;  ///< variance that each pose has for itself: positioning and rounding
   GeneralisedFit fit;
@@ -54,10 +58,26 @@ struct AxisWork {
 
 double squared(double value) { return value * value; }
 
+double samples_per_pose(const MeasurementSet& run) {
+  return static_cast<double>(run.samples.size()) / static_cast<double>(run.poses.size());
+}
+
 /// Mean time between the samples of the static record; a thousandth of a second without one.
 double static_step_s(const SampleTable* record) {
   if (record == nullptr || record->size() < 2) return 1e-3;
   return (record->t_s.back() - record->t_s.front()) / static_cast<double>(record->size() - 1);
+}
+
+/// White noise of one reading: within the dwells, or in the record when every pose is read once;
+/// negative when nothing tells.
+double white_noise_V(const CalibrationInput& input, std::size_t axis) {
+  if (samples_per_pose(input.run) > 1) return white_scatter_V(input.run, axis);
+  const SampleTable* record = input.static_record;
+  if (record == nullptr || record->size() < 2) return -1;
+  MeasurementSet one_dwell;
+  one_dwell.samples.u_V[axis] = record->u_V[axis];
+  one_dwell.poses = {Pose{0, 0, 0, 0, record->size()}};
+  return white_scatter_V(one_dwell, axis);
 }
 
 NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
@@ -68,7 +88,6 @@ NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
   } else {
     noise = identify_noise_from_bursts(input.run.samples, input.run.poses, axis);
   }
-  if (input.description.adc) noise.rounding_step = input.description.adc->lsb_V();
   return noise;
 }
 
@@ -90,40 +109,51 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
   return variance;
 }
 
-/// Covariance of the pose means, n × n.
-Eigen::MatrixXd pose_covariance_V2(const TermCovariances& unit, const NoisePowers& powers,
-                                   const Eigen::VectorXd& own_V2) {
-  Eigen::MatrixXd V = own_V2.asDiagonal();
-  for (std::size_t term = 0; term < kTermCount; ++term) {
-    const double power = powers(static_cast<Eigen::Index>(term));
-    if (power > 0) V += power * unit[term];
-  }
-  return V;
-}
-
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
   AxisWork work;
-  work.y = mean_voltages(experiment.poses, axis);
+  const Eigen::VectorXd mean_V = mean_voltages(experiment.poses, axis);
+  work.y = mean_V;
   const Eigen::Index n = work.y.size();
-  const LeastSquaresResult ordinary = solve_least_squares(experiment.A, work.y);
+  LeastSquaresResult ordinary = solve_least_squares(experiment.A, work.y);
   work.positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
-  work.own_V2 = work.positioning_V2.array() + shared_rounding_variance(identified);
-
-  NoisePowers powers = noise_powers(identified);
-  double walk_decay_per_s = identified.walk_decay_per_s;
-  if (n > 4 && powers.sum() > 0) {
-    const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
-    work.test = test_residual(identified, {work.y, experiment.A, a_g, experiment.windows,
-                                           work.positioning_V2, experiment.drivers});
-    powers = work.test.noise.power;
-    walk_decay_per_s = work.test.noise.walk_decay_per_s;
+  work.own_V2 = work.positioning_V2;
+  work.record = identified;
+  RoundingFree free;
+  if (experiment.input.description.adc && experiment.white_V[axis] >= 0) {
+    const auto free_means = [&](const Eigen::VectorXd& expected_V) {
+      free = free_of_rounding(mean_V, expected_V, *experiment.input.description.adc,
+                              experiment.white_V[axis], samples_per_pose(experiment.input.run));
+      work.y = free.mean_V;
+      ordinary = solve_least_squares(experiment.A, work.y);
+    };
+    for (int round = 0; round < kRoundingRounds; ++round) free_means(experiment.A * ordinary.x);
+    if (free.coarse && n > 4) {
+      work.record = without_record(identified);
+      const NoisePool pool(experiment.processes, work.record,
+                           work.positioning_V2 + free.variance_V2);
+      const Eigen::MatrixXd V = pool.pool(work.y, experiment.A).covariance;
+      free_means(experiment.A * ordinary.x +
+                 expected_from_others(V, work.y - experiment.A * ordinary.x));
+    }
+    work.own_V2 += free.variance_V2;
   }
-  work.noise = with_powers(identified, powers, walk_decay_per_s);
-  work.unit = unit_covariances(experiment.windows, walk_decay_per_s);
-  work.V = pose_covariance_V2(work.unit, powers, work.own_V2);
+  const NoisePowers identified_powers = noise_powers(work.record);
+  work.pooled.power = Eigen::VectorXd::Zero(experiment.processes.count());
+  work.pooled.power.head<NoiseProcesses::kFirstMarkov>() =
+      identified_powers.head<NoiseProcesses::kFirstMarkov>();
+  const bool known = identified_powers.sum() > 0 || free.coarse;
+  if (n > 4 && known) {
+    const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
+    work.test = test_residual(work.record, {work.y, experiment.A, a_g, experiment.processes,
+                                            work.own_V2, experiment.drivers, free.coarse});
+    work.pooled = work.test.noise;
+  }
+  const double span_s = experiment.poses.back().t_mean_s - experiment.poses.front().t_arrival_s;
+  work.noise = in_filter_terms(work.record, experiment.processes, work.pooled, span_s);
+  work.V = NoisePool(experiment.processes, work.record, work.own_V2).covariance(work.pooled.power);
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
-    work.noise_known = powers.sum() > 0;
+    work.noise_known = known;
     return work;
   }
   // Nothing is known about the noise: the residual has to say how large it is.
@@ -139,10 +169,10 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
                         std::size_t axis, Convergence& convergence) {
   constexpr double kPriorSd = 1e3;  // V/g and V: leaves a part in 1e16
   const Gravity& gravity = experiment.input.description.gravity;
-  NoisePowers white = NoisePowers::Zero();
-  white(kTermQ) = squared(work.noise.Q.value);
-  white(kTermN) = squared(work.noise.N.value);
-  const Eigen::VectorXd white_V2 = pose_covariance_V2(work.unit, white, work.own_V2).diagonal();
+  const auto& unit = experiment.processes.unit;
+  const Eigen::VectorXd white_V2 = work.own_V2 +
+                                   work.pooled.power(kTermQ) * unit[kTermQ].diagonal() +
+                                   work.pooled.power(kTermN) * unit[kTermN].diagonal();
 
   RecursiveLeastSquares recursive(kPriorSd);
   EightStateFilter filter(work.noise, filter_options(experiment.poses),
@@ -172,17 +202,17 @@ void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_pe
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
   u_floor_mps2 = 0;
 
-  // Powers at zero are held there; the ramp is no variance.
+  // Powers at zero are held there.
   std::vector<Eigen::Index> free;
-  for (Eigen::Index term = 0; term < static_cast<Eigen::Index>(kTermR); ++term)
-    if (work.test.noise.power(term) > 0) free.push_back(term);
-  if (!work.noise_known || free.empty()) return;
+  for (Eigen::Index i = 0; i < work.pooled.power.size(); ++i)
+    if (work.pooled.power(i) > 0) free.push_back(i);
+  if (!work.noise_known || free.empty() || work.pooled.information.size() == 0) return;
   Eigen::VectorXd slope(std::ssize(free));
   for (Eigen::Index i = 0; i < slope.size(); ++i)
     slope(i) = expected_mean_square_V2(
         experiment.A, work.fit.gain,
-        work.unit[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])]);
-  const Eigen::MatrixXd information = work.test.noise.information(free, free);
+        experiment.processes.unit[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])]);
+  const Eigen::MatrixXd information = work.pooled.information(free, free);
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::VectorXd right = scale.cwiseProduct(slope);
@@ -211,7 +241,7 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
 
 Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& options) {
   assert(input.run.has_angles && !input.run.poses.empty());
-  Experiment experiment{input, pose_means(input.run), {}, {}, {}};
+  Experiment experiment{input, pose_means(input.run), {}, {}, {}, {}, {}};
   experiment.A = design_matrix(experiment.poses, input.description.gravity);
 
   Calibration result;
@@ -223,6 +253,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
 
   experiment.windows =
       pose_windows(input.run.samples, input.run.poses, static_step_s(input.static_record));
+  experiment.processes = noise_processes(experiment.windows);
   experiment.drivers = driver_means(input.run.samples, input.run.poses);
   const std::size_t n = experiment.poses.size();
   result.convergence.rls.resize(n);
@@ -230,6 +261,9 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
   result.convergence.batch_ls.resize(n);
   result.estimates.rls.emplace();
   result.pose_results.resize(n);
+
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    experiment.white_V[axis] = white_noise_V(input, axis);
 
   PerAxis<AxisWork> work;
   parallel_for(kAxisCount, [&](std::size_t axis) {
@@ -294,10 +328,11 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
   result.final.rls.reset();
   result.after = result.before;
   if (result.diagnosis.verdict != Verdict::undetermined) {
-    ExplainInput explain_input{input, experiment.poses, experiment.windows, result.noise, {}, {}};
+    ExplainInput explain_input{
+        input, experiment.poses, experiment.windows, result.noise, {}, experiment.processes, {}};
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       explain_input.positioning_V2[axis] = work[axis].positioning_V2;
-      explain_input.pooled[axis] = work[axis].test.noise;
+      explain_input.pooled[axis] = work[axis].pooled;
     }
     if (const auto worst = explain(explain_input, options, result)) {
       worst_error_mps2 = worst->error_mps2;

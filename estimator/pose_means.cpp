@@ -62,4 +62,17 @@ Eigen::VectorXd mean_voltages(const std::vector<PoseMean>& poses, std::size_t ax
   return result;
 }
 
+double white_scatter_V(const MeasurementSet& set, std::size_t axis) {
+  const std::vector<double>& u_V = set.samples.u_V[axis];
+  double sum = 0;
+  std::size_t count = 0;
+  for (const Pose& pose : set.poses) {
+    for (std::size_t k = pose.first + 1; k < pose.first + pose.count; ++k) {
+      sum += (u_V[k] - u_V[k - 1]) * (u_V[k] - u_V[k - 1]);
+      ++count;
+    }
+  }
+  return count == 0 ? 0 : std::sqrt(sum / (2 * static_cast<double>(count)));
+}
+
 }  // namespace plumbline

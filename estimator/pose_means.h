@@ -24,4 +24,8 @@ std::vector<PoseMean> pose_means(const MeasurementSet& set);
 /// The means of one axis as a vector, V.
 Eigen::VectorXd mean_voltages(const std::vector<PoseMean>& poses, std::size_t axis);
 
+/// Standard deviation of one reading about its neighbours within the poses, from differences, which
+/// slow drifts do not enter, V; 0 when no pose has two samples.
+double white_scatter_V(const MeasurementSet& set, std::size_t axis);
+
 }  // namespace plumbline

@@ -43,7 +43,7 @@ EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
                        const EnlargedParameters& base, const std::vector<Candidate>& added) {
   EnlargedParameters model = base;
   for (const Candidate& candidate : added) model.effects.push_back(candidate.active());
-  return fit_enlarged(input.log, input.observed, result.whitening, model);
+  return fit_enlarged(input.log, result.observed, result.whitening, model);
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
   const Candidate& found = result.evidence[index].candidate;
   EnlargedParameters base = result.fit.parameters;
   base.effects.erase(base.effects.begin() + static_cast<std::ptrdiff_t>(index));
-  const EnlargedFit without = fit_enlarged(input.log, input.observed, result.whitening, base);
+  const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
   const double found_gain = without.chi2 - result.fit.chi2;
   const auto found_free =
       static_cast<double>(result.fit.parameters.free_count() - base.free_count());

@@ -40,6 +40,10 @@ CandidateList all_candidates(const VisitLog& log) {
   constexpr double kUnnamed = 7;
   CandidateList list;
   for (const Effect* effect : effect_catalogue()) add_candidates(list, log, *effect);
+  if (log.is_coarse()) {
+    for (Candidate& candidate : list.candidates)
+      candidate.of_one_coarse_reading = candidate.effect->id() == "rig.pose_outlier";
+  }
   for (auto& effect : covariate_effects(log)) {
     list.owned.push_back(std::move(effect));
     add_candidates(list, log, *list.owned.back());

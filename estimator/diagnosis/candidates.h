@@ -17,6 +17,8 @@ struct Candidate {
   Hypothesis hypothesis;
   std::size_t family = 0;  ///< hypotheses that differ only in shapes and indices share one
   double handicap = 0;     ///< log-probability by which it must beat those without
+  /// Single readings of a coarse converter stray further than Gaussian noise does.
+  bool of_one_coarse_reading = false;
 
   ActiveEffect active() const { return activate(*effect, axis, hypothesis); }
 };

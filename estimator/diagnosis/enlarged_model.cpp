@@ -186,6 +186,19 @@ Eigen::Index stacked_rows(const VisitLog& log) { return (1 + kDwellContrasts) * 
 
 namespace {
 
+// Time constants, widths and the like keep their sign.
+bool keeps_signs(const EnlargedParameters& trial, const EnlargedParameters& now) {
+  for (std::size_t e = 0; e < trial.effects.size(); ++e) {
+    const ActiveEffect& active = trial.effects[e];
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (active.free[k] && infos[k].role == ParameterRole::shape &&
+          !(active.p[k] * now.effects[e].p[k] > 0))
+        return false;
+  }
+  return true;
+}
+
 Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
                         const PerAxis<Eigen::MatrixXd>& dwell_V) {
   const Eigen::Index n = mean_V[0].size();
@@ -275,6 +288,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
       EnlargedParameters trial = fit.parameters;
       trial.set_free_values(fit.parameters.free_values() + share * step);
+      if (!keeps_signs(trial, fit.parameters)) continue;
       const Eigen::VectorXd residual = whitened_residual(trial);
       const double chi2 = residual.squaredNorm();
       if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;

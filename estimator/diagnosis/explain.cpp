@@ -58,19 +58,20 @@ AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& searc
                              const SearchResult& found, const Eigen::VectorXd& effect_V,
                              std::size_t axis) {
   const PooledNoise& pooled = found.noise[axis];
-  const NoiseModel noise = with_powers(search.noise[axis], pooled.power, pooled.walk_decay_per_s);
+  const double span_s = input.poses.back().t_mean_s - input.poses.front().t_arrival_s;
+  const NoiseModel noise = in_filter_terms(search.noise[axis], input.processes, pooled, span_s);
   EightStateFilter filter(noise, filter_options(input.poses), input.poses.front().t_arrival_s);
   for (std::size_t k = 0; k < input.poses.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
     filter.predict(input.poses[k].t_mean_s);
     const SampleWindow& window = input.windows[k];
     const double duration_s = window.step_s * static_cast<double>(window.count);
-    const double variance_V2 =
-        pooled.power(kTermN) / duration_s + 2 * pooled.power(kTermQ) / (duration_s * duration_s) +
-        input.positioning_V2[axis](row) + shared_rounding_variance(search.noise[axis]);
+    const double variance_V2 = pooled.power(kTermN) / duration_s +
+                               2 * pooled.power(kTermQ) / (duration_s * duration_s) +
+                               found.own_V2[axis](row);
     const Visit& visit = search.log.visits[k];
     filter.update(specific_force_g({visit.delta_rad, visit.h_rad}, search.log.gamma),
-                  search.observed.mean_V[axis](row) - effect_V(row), variance_V2);
+                  found.observed.mean_V[axis](row) - effect_V(row), variance_V2);
   }
   return filter.parameters();
 }
@@ -88,7 +89,7 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
       EnlargedParameters fewer = found.fit.parameters;
       const ActiveEffect removed = fewer.effects[k];
       fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
-      EnlargedFit without = fit_enlarged(search.log, search.observed, found.whitening, fewer);
+      EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening, fewer);
       const double gain = heldout_gain(heldout_mps2(heldout, partitions, without), with, floor_mps2,
                                        axes_of(removed));
       // One pose's own error cannot be predicted from other poses.
@@ -111,10 +112,9 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                                   Calibration& result) {
   const VisitLog log = make_visit_log(input.input.run, input.input.description);
   const Observations observed = observe(input.input.run, log);
-  const PerAxis<Eigen::VectorXd>& mean_V = observed.mean_V;
   EnlargedParameters start;
   for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
-  const SearchInput search{log,   observed,     input.noise, input.windows, input.positioning_V2,
+  const SearchInput search{log,   observed,     input.noise, input.processes, input.positioning_V2,
                            start, &input.pooled};
   SearchOptions search_options;
   search_options.seed = options.seed;
@@ -124,6 +124,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
 
   std::vector<double> gains;
   const std::size_t before_dropping = found.evidence.size();
+  const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
   const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
   drop_what_does_not_carry(search, heldout, partitions, result.floor_pose_rms_mps2, found, gains);

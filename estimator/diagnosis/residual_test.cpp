@@ -90,12 +90,13 @@ Eigen::MatrixXd structure_functions(const Eigen::MatrixXd& a, const Eigen::Matri
 /// 2/relvar of tr(S·Σ)/q under the uncertainty of the estimated powers, S what the functions take.
 double noise_degrees_of_freedom(const NoisePool& pool, const PooledNoise& noise,
                                 const Eigen::MatrixXd& taken, double functions) {
-  // A slow term estimated at zero is uncertain all the same.
+  // A slow process estimated at zero is uncertain all the same.
   const std::vector<Eigen::Index> free = {kTermN, kTermB, kTermK};
   Eigen::VectorXd slope(static_cast<Eigen::Index>(free.size()));
   for (std::size_t i = 0; i < free.size(); ++i)
     slope(static_cast<Eigen::Index>(i)) =
-        taken.cwiseProduct(pool.unit()[static_cast<std::size_t>(free[i])]).sum() / functions;
+        taken.cwiseProduct(pool.processes().unit[static_cast<std::size_t>(free[i])]).sum() /
+        functions;
   const Eigen::MatrixXd information = noise.information(free, free);
   const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
@@ -170,14 +171,14 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   Eigen::MatrixXd full(n, input.design.cols() + functions.cols());
   full << input.design, functions;
   const bool enough = n >= input.design.cols() + 3 * functions.cols();
-  // The kind of walk is chosen beside the functions where that is possible: structure that is left
-  // in would pass for one.
-  const NoisePool best =
-      best_pool(noise, input.windows, y, enough ? full : input.design, input.extra_variance);
-  const NoisePool plain_pool =
-      enough ? NoisePool(best.model(), input.windows, y, input.design, input.extra_variance) : best;
-  const Judgement plain = judge(plain_pool, plain_pool.pooled_with_information(), y, input.design,
-                                functions, input.design.cols());
+  const NoisePool pool(input.processes, noise, input.extra_variance);
+  const auto judged = [&](const PooledNoise& pooled, const Eigen::MatrixXd& beside) {
+    PooledNoise informed = pooled;
+    informed.information = pool.information_of(pooled, beside);
+    return judge(pool, std::move(informed), y, input.design, functions, beside.cols());
+  };
+  const PooledNoise plain_noise = pool.pool(y, input.design);
+  const Judgement plain = judged(plain_noise, input.design);
   ResidualTestResult result;
   result.noise = plain.noise;
   result.p_structure = 1;
@@ -185,8 +186,7 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   if (enough) {
     // With the noise estimated beside the model alone, structure is partly taken for slow noise;
     // beside the functions, too, slow noise is partly taken for structure. Both count.
-    const Judgement rich =
-        judge(best, best.pooled_with_information(), y, input.design, functions, full.cols());
+    const Judgement rich = judged(pool.pool(y, full, &plain_noise.power), full);
     result.p_structure = merged(plain.p_structure, rich.p_structure);
     if (result.p_structure < kStructureSeen) {
       result.noise = rich.noise;
@@ -210,7 +210,9 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   double worst = 0;
   for (Eigen::Index i = 0; i < n; ++i)
     if (P(i, i) > 0) worst = std::max(worst, std::abs(py(i)) / std::sqrt(P(i, i)));
-  result.p_outlier = std::min(1.0, static_cast<double>(n) * normal_two_sided_tail(worst));
+  const double p_worst =
+      input.coarse ? f_tail(worst * worst, 1, kDofOfCoarseReadings) : normal_two_sided_tail(worst);
+  result.p_outlier = std::min(1.0, static_cast<double>(n) * p_worst);
 
   result.p_value =
       std::min(1.0, 3 * std::min({result.p_structure, result.p_excess, result.p_outlier}));

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "estimator/noise/covariance.h"
 #include "estimator/noise/noise_model.h"
 #include "estimator/noise/reml.h"
 
@@ -12,14 +11,19 @@ namespace plumbline {
 
 /// One axis, n poses in visiting order.
 struct ResidualTestInput {
-  const Eigen::VectorXd& mean;               ///< n pose means, V
-  const Eigen::MatrixXd& design;             ///< n×p columns of the model under test, full rank
-  const Eigen::MatrixXd& specific_force;     ///< n×3, g: what the position-dependent tests use
-  const std::vector<SampleWindow>& windows;  ///< n
-  const Eigen::VectorXd& extra_variance;     ///< n known variances (positioning), V², or empty
+  const Eigen::VectorXd& mean;            ///< n pose means, V
+  const Eigen::MatrixXd& design;          ///< n×p columns of the model under test, full rank
+  const Eigen::MatrixXd& specific_force;  ///< n×3, g: what the position-dependent tests use
+  const NoiseProcesses& processes;        ///< at the n windows
+  const Eigen::VectorXd& extra_variance;  ///< n known variances (positioning), V², or empty
   /// n×k means of further recorded quantities (temperature, humidity …), any unit; may be empty.
   Eigen::MatrixXd drivers = {};
+  /// The means were freed of coarse rounding: single ones stray further than Gaussian noise does.
+  bool coarse = false;
 };
+
+/// Degrees of freedom of Student's t that stands for the tails of single such means.
+inline constexpr double kDofOfCoarseReadings = 6;
 
 struct ResidualTestResult {
   double chi2 = 0;         ///< whitened sum of squares r'Σ⁻¹r

@@ -8,6 +8,8 @@
 #include <random>
 #include <utility>
 
+#include "estimator/diagnosis/residual_test.h"
+#include "estimator/fit/rounding.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
@@ -25,6 +27,8 @@ namespace {
 
 // The model with noise of its own: powers that the residual under this model supports.
 struct Stage {
+  Observations observed;            ///< freed of rounding as this model sees it
+  PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
   EnlargedFit fit;
   PerAxis<PooledNoise> noise;
   PoseWhitening whitening;
@@ -48,7 +52,8 @@ Eigen::MatrixXd independent_columns(const Eigen::MatrixXd& block) {
   return basis;
 }
 
-// Scatter of the contrasts about the model, from their median so that few odd dwells do not matter.
+// Scatter of the contrasts about the model. Few odd dwells do not matter; the median would not do,
+// since readings of a coarse converter are often all the same.
 PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
                                          const EnlargedParameters& parameters) {
   const auto predicted = predict_dwells_V(input.log, parameters);
@@ -56,45 +61,61 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     sd_V[i].resize(kDwellContrasts);
     for (Eigen::Index d = 0; d < kDwellContrasts; ++d) {
-      Eigen::VectorXd size = (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).cwiseAbs();
-      const auto middle = size.begin() + size.size() / 2;
-      std::nth_element(size.begin(), middle, size.end());
-      constexpr double kNormal = 1.4826;  // median of |x| to standard deviation
+      const Eigen::ArrayXd off =
+          (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).array().abs();
+      const auto count = static_cast<double>(off.size());
+      const double rms = std::sqrt(off.square().sum() / count);
+      const double clipped = std::sqrt(off.min(4 * rms).square().sum() / count);
       // Contrasts that are all zero (single readings) carry no information.
-      sd_V[i](d) = *middle > 0 ? kNormal * *middle : 1;
+      sd_V[i](d) = clipped > 0 ? clipped : 1;
     }
   }
   return sd_V;
 }
 
-Stage stage_with(const SearchInput& input, const EnlargedParameters& start,
-                 PerAxis<PooledNoise> noise) {
-  Stage stage;
-  stage.noise = std::move(noise);
-  parallel_for(kAxisCount, [&](std::size_t i) {
-    stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
-  });
-  stage.whitening.dwell_sd_V = dwell_scatter_V(input, start);
-  stage.fit = fit_enlarged(input.log, input.observed, stage.whitening, start);
-  return stage;
-}
-
 // Noise and parameters depend on each other only weakly: one round after the parameters are known
-// settles both.
-Stage settle(const SearchInput& input, const EnlargedParameters& parameters) {
+// settles both. `known`: the noise when it has been pooled already; `before`: powers to start from.
+Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
+             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before) {
   const auto predicted = predict_means_V(input.log, parameters);
   const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
   const Eigen::Index n = predicted[0].size();
-  PerAxis<PooledNoise> noise;
+  const double samples = static_cast<double>(input.log.visits.front().count);
+  Stage stage;
+  stage.observed = input.observed;
+  stage.whitening.dwell_sd_V = dwell_scatter_V(input, parameters);
   parallel_for(kAxisCount, [&](std::size_t i) {
-    const Eigen::MatrixXd design =
-        independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
-    const Eigen::VectorXd residual = input.observed.mean_V[i] - predicted[i];
-    noise[i] =
-        best_pool(input.noise[i], input.windows, residual, design, input.extra_variance_V2[i])
-            .pooled();
+    Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
+    RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
+    const auto free_means = [&](const Eigen::VectorXd& expected_V) {
+      if (!input.log.adc || samples < 2) return;
+      free = free_of_rounding(input.observed.mean_V[i], expected_V, *input.log.adc,
+                              input.log.sample_sd_V[i], samples);
+      mean_V = free.mean_V;
+    };
+    free_means(predicted[i]);
+    const Eigen::VectorXd first_V2 = free.variance_V2;
+    if (known != nullptr) {
+      stage.noise[i] = (*known)[i];
+    } else {
+      const Eigen::MatrixXd design =
+          independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
+      const NoisePool pool(input.processes,
+                           free.coarse ? without_record(input.noise[i]) : input.noise[i],
+                           input.positioning_V2[i] + free.variance_V2);
+      stage.noise[i] = pool.pool(mean_V - predicted[i], design,
+                                 before != nullptr ? &(*before)[i].power : nullptr);
+    }
+    if (free.coarse) {
+      free_means(predicted[i] +
+                 expected_from_others(stage.noise[i].covariance, mean_V - predicted[i]));
+      if (known == nullptr) stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
+    }
+    stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
+    stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
   });
-  return stage_with(input, parameters, std::move(noise));
+  stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
+  return stage;
 }
 
 // How many independent looks the search amounts to: the best p-value of a search over pure noise
@@ -122,6 +143,12 @@ double effective_looks(const CandidateGains& gains_of, std::size_t candidates, E
 double p_of_search(double log_p_local, double looks) {
   // Smaller than any double holds is still not zero.
   return std::max(-std::expm1(-looks * std::exp(log_p_local)), 1e-300);
+}
+
+/// log of the probability that noise alone gives a candidate this gain.
+double log_p_of(const Candidate& candidate, double gain, int dof) {
+  if (!candidate.of_one_coarse_reading) return log_chi_squared_tail(gain, dof);
+  return std::log(std::max(f_tail(gain / dof, dof, kDofOfCoarseReadings), 1e-300));
 }
 
 struct Scored {
@@ -154,86 +181,231 @@ EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& act
   return model;
 }
 
-}  // namespace
+/// The search on its way: the model, and what each of its effects cost to find.
+class Search {
+ public:
+  Search(const SearchInput& input, const CandidateList& list, const SearchOptions& options)
+      : input_(input), list_(list), options_(options) {
+    stage_ = settle(input, input.start, input.pooled, nullptr);
+  }
 
-SearchResult search_effects(const SearchInput& input, const CandidateList& list,
-                            const SearchOptions& options) {
-  constexpr std::size_t kRefined = 10;  // families that are refitted in full at each step
-  SearchResult result;
-  Stage stage = input.pooled != nullptr ? stage_with(input, input.start, *input.pooled)
-                                        : settle(input, input.start);
-  std::vector<Candidate> chosen;
-  std::vector<double> p_values;
-  double looks = 1;
+  SearchResult run() {
+    while (chosen_.size() < options_.max_effects && add_one()) drop_superfluous();
+    while (exchange_one()) drop_superfluous();
+    return result();
+  }
 
-  while (true) {
+ private:
+  /// What a candidate must gain in χ² to be worth its freedom, its choice among many and its want
+  /// of a name. About 2·ln of the number of poses a parameter.
+  static constexpr double kPricePerParameter = 7;
+  double price(std::size_t candidate, int dof) const {
+    const Candidate& c = list_.candidates[candidate];
+    return 2 * (std::log(static_cast<double>(list_.family_size[c.family])) + c.handicap) +
+           kPricePerParameter * dof;
+  }
+
+  EnlargedFit fit(const EnlargedParameters& parameters) const {
+    return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
+  }
+  EnlargedFit fit_without(const std::vector<std::size_t>& removed) const {
+    EnlargedParameters fewer = stage_.fit.parameters;
+    for (auto k = removed.rbegin(); k != removed.rend(); ++k)
+      fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(*k));
+    return fit(fewer);
+  }
+  /// Takes over a model when its parameters are determined.
+  bool adopt(const EnlargedParameters& parameters) {
+    Stage next = settle(input_, parameters, nullptr, &stage_.noise);
+    if (!next.fit.determined) return false;
+    stage_ = std::move(next);
+    return true;
+  }
+
+  /// Adds the best candidate if the search as a whole would not often find as much in noise.
+  bool add_one() {
     const CandidateResponses responses =
-        candidate_responses(input.log, list, stage.whitening, stage.fit.parameters);
-    const CandidateGains gains_of(responses, stage.fit);
-    const Eigen::VectorXd gains = gains_of.of(stage.fit.whitened_residual).col(0);
-    const std::vector<Scored> ranked = screen(list, gains_of, gains);
-    if (ranked.empty()) break;
+        candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
+    const CandidateGains gains(responses, stage_.fit);
+    std::vector<Scored> ranked =
+        screen(list_, gains, gains.of(stage_.fit.whitened_residual).col(0));
+    std::erase_if(ranked, [&](const Scored& s) {
+      return std::count(dropped_.begin(), dropped_.end(), list_.candidates[s.candidate].family) > 0;
+    });
+    if (ranked.empty()) return false;
     // The number of looks hardly changes while the model grows.
-    if (chosen.empty())
-      looks = effective_looks(gains_of, list.candidates.size(), stage.fit.whitened_residual.size(),
-                              options);
-    const double best_log_p =
-        std::min_element(ranked.begin(), ranked.end(), [](const Scored& a, const Scored& b) {
-          return a.log_p < b.log_p;
-        })->log_p;
-    result.p_best_rest = p_of_search(best_log_p, looks);
-    if (result.p_best_rest > options.false_alarm || chosen.size() == options.max_effects) break;
+    if (looks_ == 0)
+      looks_ = effective_looks(gains, list_.candidates.size(), stage_.fit.whitened_residual.size(),
+                               options_);
+    const auto surest =
+        std::min_element(ranked.begin(), ranked.end(),
+                         [](const Scored& a, const Scored& b) { return a.log_p < b.log_p; });
+    p_best_rest_ = p_of_search(surest->log_p, looks_);
+    if (p_best_rest_ > options_.false_alarm) return false;
 
     // First order ranks; the full response decides.
+    constexpr std::size_t kRefined = 10;
     const Scored* winner = nullptr;
     EnlargedFit winner_fit;
     double winner_score = std::numeric_limits<double>::infinity(), winner_log_p = 0;
     for (std::size_t k = 0; k < std::min(kRefined, ranked.size()); ++k) {
       const Scored& s = ranked[k];
-      EnlargedFit fit =
-          fit_enlarged(input.log, input.observed, stage.whitening,
-                       with_effect(stage.fit.parameters, list.candidates[s.candidate].active()));
-      if (!fit.determined) continue;
-      const double dof = gains_of.dof(s.candidate);
-      const double log_p = log_chi_squared_tail(stage.fit.chi2 - fit.chi2, dof);
+      EnlargedFit with =
+          fit(with_effect(stage_.fit.parameters, list_.candidates[s.candidate].active()));
+      if (!with.determined) continue;
+      const double log_p = log_p_of(list_.candidates[s.candidate], stage_.fit.chi2 - with.chi2,
+                                    gains.dof(s.candidate));
       const double score = log_p + (s.score - s.log_p);
       if (score < winner_score) {
         winner = &s;
-        winner_fit = std::move(fit);
+        winner_fit = std::move(with);
         winner_score = score;
         winner_log_p = log_p;
       }
     }
-    if (winner == nullptr || p_of_search(winner_log_p, looks) > options.false_alarm) break;
-    chosen.push_back(list.candidates[winner->candidate]);
-    p_values.push_back(p_of_search(winner_log_p, looks));
-    stage = settle(input, winner_fit.parameters);
+    if (winner == nullptr) return replace_overlapping(ranked, gains);
+    const double p = p_of_search(winner_log_p, looks_);
+    if (p > options_.false_alarm || !adopt(winner_fit.parameters)) return false;
+    chosen_.push_back(winner->candidate);
+    p_values_.push_back(p);
+    return true;
+  }
 
-    // Backward: what the newcomer has made superfluous goes.
-    for (std::size_t k = chosen.size(); k-- > 0 && chosen.size() > 1;) {
-      EnlargedParameters without = stage.fit.parameters;
-      without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(k));
-      const EnlargedFit fit = fit_enlarged(input.log, input.observed, stage.whitening, without);
-      const auto free =
-          static_cast<double>(stage.fit.parameters.free_count() - without.free_count());
-      const double log_p = log_chi_squared_tail(fit.chi2 - stage.fit.chi2, std::max(1.0, free));
-      if (p_of_search(log_p, looks) < options.false_alarm) continue;
-      chosen.erase(chosen.begin() + static_cast<std::ptrdiff_t>(k));
-      p_values.erase(p_values.begin() + static_cast<std::ptrdiff_t>(k));
-      stage = settle(input, fit.parameters);
+  /// A term that holds one of the model's effects as a special case cannot stand beside it: it
+  /// takes its place.
+  bool replace_overlapping(const std::vector<Scored>& ranked, const CandidateGains& gains) {
+    for (std::size_t r = 0; r < std::min<std::size_t>(3, ranked.size()); ++r) {
+      const std::size_t candidate = ranked[r].candidate;
+      for (std::size_t k = 0; k < chosen_.size(); ++k) {
+        const EnlargedFit without = fit_without({k});
+        const EnlargedFit with =
+            fit(with_effect(without.parameters, list_.candidates[candidate].active()));
+        if (!with.determined) continue;
+        const double gained = stage_.fit.chi2 - with.chi2;
+        const double p = p_of_search(
+            log_p_of(list_.candidates[candidate], gained, gains.dof(candidate)), looks_);
+        if (p > options_.false_alarm || !adopt(with.parameters)) continue;
+        move_to_back(k, candidate, p);
+        return true;
+      }
+    }
+    return false;
+  }
+
+  void move_to_back(std::size_t removed, std::size_t candidate, double p) {
+    chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(removed));
+    p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(removed));
+    chosen_.push_back(candidate);
+    p_values_.push_back(p);
+  }
+
+  double p_of_removal(const EnlargedFit& without) const {
+    const auto free =
+        static_cast<double>(stage_.fit.parameters.free_count() - without.parameters.free_count());
+    return p_of_search(log_chi_squared_tail(without.chi2 - stage_.fit.chi2, std::max(1.0, free)),
+                       looks_);
+  }
+
+  /// What a newcomer has made superfluous goes.
+  void drop_superfluous() {
+    for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
+      const EnlargedFit without = fit_without({k});
+      if (!without.determined || p_of_removal(without) < options_.false_alarm) continue;
+      if (!adopt(without.parameters)) continue;
+      // What proved superfluous once would come back and go again.
+      dropped_.push_back(list_.candidates[chosen_[k]].family);
+      chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(k));
+      p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(k));
     }
   }
 
-  for (std::size_t k = 0; k < chosen.size(); ++k) {
-    EnlargedParameters without = stage.fit.parameters;
-    without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(k));
-    const EnlargedFit fit = fit_enlarged(input.log, input.observed, stage.whitening, without);
-    result.evidence.push_back({chosen[k], fit.chi2 - stage.fit.chi2, p_values[k]});
+  int dof_of(std::size_t k) const {
+    const auto& free = stage_.fit.parameters.effects[k].free;
+    return static_cast<int>(std::count(free.begin(), free.end(), true));
   }
-  result.fit = std::move(stage.fit);
-  result.noise = std::move(stage.noise);
-  result.whitening = std::move(stage.whitening);
-  return result;
+
+  /// Replaces one effect, or two, by a single one that explains as much for less. What was chosen
+  /// first was chosen while the others were still missing.
+  bool exchange_one() {
+    if (chosen_.empty() || exchanges_ == kMostExchanges) return false;
+    ++exchanges_;
+    const CandidateResponses responses =
+        candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
+    std::vector<std::vector<std::size_t>> subsets;
+    for (std::size_t k = 0; k < chosen_.size(); ++k) subsets.push_back({k});
+    for (std::size_t k = 0; k < chosen_.size(); ++k)
+      for (std::size_t l = k + 1; l < chosen_.size(); ++l) subsets.push_back({k, l});
+    for (const std::vector<std::size_t>& subset : subsets) {
+      const EnlargedFit without = fit_without(subset);
+      if (!without.determined) continue;
+      double spent = 0;
+      for (const std::size_t k : subset) spent += price(chosen_[k], std::max(1, dof_of(k)));
+      const CandidateGains gains(responses, without);
+      const std::vector<Scored> ranked =
+          screen(list_, gains, gains.of(without.whitened_residual).col(0));
+      constexpr std::size_t kRefined = 4;
+      constexpr double kClearly = 2;
+      for (std::size_t r = 0; r < std::min(kRefined, ranked.size()); ++r) {
+        const std::size_t candidate = ranked[r].candidate;
+        if (subset.size() == 1 &&
+            list_.candidates[candidate].family ==
+                list_.candidates[chosen_[subset.front()]].family &&
+            list_.candidates[candidate].hypothesis.p ==
+                list_.candidates[chosen_[subset.front()]].hypothesis.p)
+          continue;
+        const EnlargedFit with =
+            fit(with_effect(without.parameters, list_.candidates[candidate].active()));
+        if (!with.determined) continue;
+        const double cost = with.chi2 + price(candidate, std::max(1, gains.dof(candidate)));
+        if (!(cost < stage_.fit.chi2 + spent - kClearly)) continue;
+        const double p = p_of_search(
+            log_p_of(list_.candidates[candidate], without.chi2 - with.chi2, gains.dof(candidate)),
+            looks_);
+        if (p > options_.false_alarm || !adopt(with.parameters)) continue;
+        for (auto k = subset.rbegin(); k != subset.rend(); ++k) {
+          chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(*k));
+          p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(*k));
+        }
+        chosen_.push_back(candidate);
+        p_values_.push_back(p);
+        return true;
+      }
+    }
+    return false;
+  }
+
+  SearchResult result() {
+    SearchResult result;
+    for (std::size_t k = 0; k < chosen_.size(); ++k)
+      result.evidence.push_back(
+          {list_.candidates[chosen_[k]], fit_without({k}).chi2 - stage_.fit.chi2, p_values_[k]});
+    result.fit = std::move(stage_.fit);
+    result.observed = std::move(stage_.observed);
+    result.own_V2 = std::move(stage_.own_V2);
+    result.noise = std::move(stage_.noise);
+    result.whitening = std::move(stage_.whitening);
+    result.p_best_rest = p_best_rest_;
+    return result;
+  }
+
+  static constexpr int kMostExchanges = 4;
+  const SearchInput& input_;
+  const CandidateList& list_;
+  const SearchOptions& options_;
+  Stage stage_;
+  std::vector<std::size_t> chosen_;  ///< candidates, in the order of the model's effects
+  std::vector<double> p_values_;
+  std::vector<std::size_t> dropped_;  ///< families
+  double looks_ = 0;
+  double p_best_rest_ = 1;
+  int exchanges_ = 0;
+};
+
+}  // namespace
+
+SearchResult search_effects(const SearchInput& input, const CandidateList& list,
+                            const SearchOptions& options) {
+  return Search(input, list, options).run();
 }
 
 }  // namespace plumbline

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "estimator/diagnosis/candidates.h"
-#include "estimator/noise/covariance.h"
 #include "estimator/noise/noise_model.h"
 #include "estimator/noise/reml.h"
 
@@ -24,11 +23,11 @@ struct SearchOptions {
 /// The data of a search; n visits.
 struct SearchInput {
   const VisitLog& log;
-  const Observations& observed;
+  const Observations& observed;  ///< as measured
   const PerAxis<NoiseModel>& noise;
-  const std::vector<SampleWindow>& windows;           ///< n
-  const PerAxis<Eigen::VectorXd>& extra_variance_V2;  ///< n known variances (positioning), or empty
-  EnlargedParameters start;                           ///< the 12 parameters, no effects
+  const NoiseProcesses& processes;                 ///< at the n visits
+  const PerAxis<Eigen::VectorXd>& positioning_V2;  ///< n known variances, V²
+  EnlargedParameters start;                        ///< the 12 parameters, no effects
   /// Noise beside the 12 parameters when it is known already; null: the search finds it.
   const PerAxis<PooledNoise>* pooled = nullptr;
 };
@@ -43,7 +42,9 @@ struct Evidence {
 struct SearchResult {
   EnlargedFit fit;  ///< 12 parameters and the effects, in the order of `evidence`
   std::vector<Evidence> evidence;
-  PerAxis<PooledNoise> noise;  ///< re-estimated under the final model
+  Observations observed;            ///< freed of rounding as the final model sees it
+  PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
+  PerAxis<PooledNoise> noise;       ///< re-estimated under the final model
   PoseWhitening whitening;
   double p_best_rest = 1;  ///< p-value of the best candidate that was not taken
 };

@@ -6,6 +6,9 @@
 #include <numbers>
 #include <numeric>
 
+#include "estimator/fit/rounding.h"
+#include "estimator/pose_means.h"
+
 namespace plumbline {
 namespace {
 
@@ -15,19 +18,6 @@ double mean_of(const std::vector<double>& column, const Pose& pose) {
   const auto begin = column.begin() + static_cast<std::ptrdiff_t>(pose.first);
   return std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(pose.count), 0.0) /
          static_cast<double>(pose.count);
-}
-
-// Scatter within the dwells from differences of neighbours, which slow drifts do not enter.
-double white_sd(const std::vector<double>& u, const std::vector<Pose>& poses) {
-  double sum = 0;
-  std::size_t count = 0;
-  for (const Pose& pose : poses) {
-    for (std::size_t k = pose.first + 1; k < pose.first + pose.count; ++k) {
-      sum += (u[k] - u[k - 1]) * (u[k] - u[k - 1]);
-      ++count;
-    }
-  }
-  return count == 0 ? 0 : std::sqrt(sum / (2 * static_cast<double>(count)));
 }
 
 double smallest_step(std::vector<double> u) {
@@ -58,6 +48,12 @@ Eigen::MatrixXd dwell_contrasts(std::size_t samples) {
     contrasts.col(used++) = step.normalized();
   }
   return contrasts;
+}
+
+bool VisitLog::is_coarse() const {
+  return adc && visits.front().count > 1 &&
+         std::any_of(sample_sd_V.begin(), sample_sd_V.end(),
+                     [&](double sd_V) { return is_coarse_against(*adc, sd_V); });
 }
 
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {
@@ -107,7 +103,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
                   [&](Visit& v) { v.delta_direction = turned->delta_direction; });
   }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    log.sample_sd_V[i] = white_sd(samples.u_V[i], set.poses);
+    log.sample_sd_V[i] = white_scatter_V(set, i);
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);
     const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
     log.lowest_V[i] = *low;

@@ -40,6 +40,8 @@ struct VisitLog {
   /// dwell_contrasts() of every number of samples that occurs.
   std::map<std::size_t, Eigen::MatrixXd> contrasts;
 
+  /// Whether some axis reads with less noise than its converter needs to average rounding away.
+  bool is_coarse() const;
   double first_s() const { return visits.front().t_arrival_s; }
   double last_s() const { return visits.back().t_mean_s; }
 };

@@ -4,27 +4,6 @@
 #include <cmath>
 
 namespace plumbline {
-namespace {
-
-NoiseTerm term_of_power(double power) {
-  NoiseTerm term;
-  term.value = std::sqrt(std::max(power, 0.0));
-  term.present = power > 0;
-  return term;
-}
-
-}  // namespace
-
-NoiseModel with_powers(NoiseModel noise, const NoisePowers& powers, double walk_decay_per_s) {
-  noise.walk_decay_per_s = walk_decay_per_s;
-  noise.Q = term_of_power(powers(kTermQ));
-  noise.N = term_of_power(powers(kTermN));
-  noise.B = term_of_power(powers(kTermB));
-  noise.K = term_of_power(powers(kTermK));
-  noise.R = term_of_power(powers(kTermR));
-  return noise;
-}
-
 AxisEstimate with_gravity(AxisEstimate estimate, const Gravity& gravity, double inflation) {
   estimate.covariance *= inflation;
   const double relative = gravity.u_mps2 / gravity.local_mps2;

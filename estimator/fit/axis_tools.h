@@ -9,10 +9,6 @@
 
 namespace plumbline {
 
-/// The same noise with other powers: the filter has to believe in what the batch fit believes, or
-/// their comparison says nothing.
-NoiseModel with_powers(NoiseModel noise, const NoisePowers& powers, double walk_decay_per_s);
-
 /// Adds what the fit cannot see: local gravity scales all of K alike. `inflation` is the Birge
 /// ratio squared.
 AxisEstimate with_gravity(AxisEstimate estimate, const Gravity& gravity, double inflation = 1);

@@ -31,7 +31,8 @@ double mean_log_distance(const SampleWindow& a, const SampleWindow& b) {
          (wa * wb);
 }
 
-/// Covariance of the window means of a Gauss-Markov process with unit driving density.
+}  // namespace
+
 Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double decay_per_s) {
   const auto n = static_cast<Eigen::Index>(windows.size());
   const double variance = 0.5 / decay_per_s;
@@ -53,8 +54,6 @@ Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double de
   }
   return covariance;
 }
-
-}  // namespace
 
 std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses,
                                        double single_step_s) {
@@ -136,15 +135,7 @@ Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<Sampl
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t term = 0; term < kTermCount; ++term)
     covariance += power(static_cast<Eigen::Index>(term)) * unit[term];
-  covariance.diagonal().array() += shared_rounding_variance(model);
   return covariance;
-}
-
-double shared_rounding_variance(const NoiseModel& model) {
-  if (!(model.rounding_step > 0)) return 0;
-  const double white = model.N.value * model.N.value * model.rate_hz;
-  const double before = white - model.rounding_step * model.rounding_step / 12;
-  return rounding_variance(model.rounding_step, std::sqrt(std::max(before, 0.0)));
 }
 
 double rounding_variance(double step, double sigma) {
@@ -158,6 +149,40 @@ double rounding_variance(double step, double sigma) {
     if (term < 1e-12) break;
   }
   return step * step / (2 * std::numbers::pi * std::numbers::pi) * sum;
+}
+
+namespace {
+
+constexpr int kHarmonics = 50;  // of the sawtooth; the sharpest edges are a fiftieth of a step wide
+
+}  // namespace
+
+RoundingBias rounding_bias(double value, double origin, double step, double sigma) {
+  assert(step > 0 && sigma >= 0);
+  const double turn = 2 * std::numbers::pi * std::remainder((value - origin) / step, 1.0);
+  const double fade = 2 * std::numbers::pi * std::numbers::pi * sigma * sigma / (step * step);
+  RoundingBias result;
+  for (int k = 1; k <= kHarmonics; ++k) {
+    const double size = (k % 2 == 0 ? 1 : -1) * std::exp(-fade * k * k);
+    if (std::abs(size) < 1e-9) break;
+    result.bias += step / (std::numbers::pi * k) * size * std::sin(turn * k);
+    result.slope += 2 * size * std::cos(turn * k);
+  }
+  return result;
+}
+
+double rounding_variance_left(double step, double sigma, double slow) {
+  assert(step > 0 && sigma >= 0 && slow >= 0);
+  const double turn = 2 * std::numbers::pi / step;
+  double sum = 0;
+  for (int k = 1; k <= kHarmonics; ++k) {
+    const double size = std::exp(-turn * turn * sigma * sigma * k * k);
+    if (size < 1e-12) break;
+    const double lost = turn * turn * slow * slow * k * k;
+    sum +=
+        size * (-2 / (turn * turn * k * k) * std::expm1(-lost) - 2 * slow * slow * std::exp(-lost));
+  }
+  return std::max(sum, 0.0);
 }
 
 }  // namespace plumbline

@@ -36,15 +36,29 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
 std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<SampleWindow>& windows,
                                                          double walk_decay_per_s);
 
+/// Covariance of the window means of a first-order Gauss-Markov process with unit driving density
+/// and the given inverse correlation time.
+Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double decay_per_s);
+
 /// Covariance of the window means under all identified terms, U², positive definite when white
-/// noise or rounding is present. Rounding coarser than the noise adds shared_rounding_variance() to
-/// the diagonal.
+/// noise or rounding is present.
 Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<SampleWindow>& windows);
 
-/// Rounding offset that all readings of a window share under `model`, U²: rounding_variance() with
-/// the noise before rounding, since the white noise of a record holds step²/12 of it. 0 without
-/// `rounding_step`.
-double shared_rounding_variance(const NoiseModel& model);
+/// What rounding to a multiple of `step` from `origin` adds on average to readings of `value` with
+/// Gaussian noise `sigma`, and its derivative by the value:
+/// (step/π)·Σ_k (−1)^k/k·sin(2πk(value − origin)/step)·exp(−2π²k²σ²/step²). The bias lies between
+/// −step/2 and step/2; beyond one step of noise there is none.
+struct RoundingBias {
+  double bias = 0;
+  double slope = 0;
+};
+RoundingBias rounding_bias(double value, double origin, double step, double sigma);
+
+/// Variance that rounding leaves in the mean of many readings after its bias at the expected value
+/// and the slope there have been allowed for, when the true value scatters about the expected one
+/// by `slow` from mean to mean and by `sigma` within: rounding_variance() for slow scatter of more
+/// than a step, nothing without any.
+double rounding_variance_left(double step, double sigma, double slow);
 
 /// Variance, over a uniformly distributed true value, of the offset that rounding to `step` leaves
 /// in the mean of many readings with Gaussian noise `sigma`:

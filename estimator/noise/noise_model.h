@@ -67,9 +67,6 @@ struct NoiseModel {
   /// Rate at which the random walk K forgets, 1/s: a first-order Gauss-Markov process with this
   /// inverse correlation time and driving density K². 0: never, the walk of IEEE Std 952.
   double walk_decay_per_s = 0;
-  /// Step of the converter where it is coarser than the noise, U. Then the rounding of a resting
-  /// reading does not average out; 0 when it is buried in the white noise, where N contains it.
-  double rounding_step = 0;
   DeviationCurve oadev;        ///< overlapping Allan deviation of the record
   std::vector<double> fitted;  ///< Allan deviation of the fitted terms at oadev.tau_s
   double chi2 = 0;

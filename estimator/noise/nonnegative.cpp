@@ -1,7 +1,9 @@
 #include "estimator/noise/nonnegative.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 namespace plumbline {
@@ -43,6 +45,33 @@ Eigen::Vector4d nonnegative_solution(const Eigen::Matrix4d& a, const Eigen::Vect
     }
   }
   return best;
+}
+
+Eigen::VectorXd nonnegative_solution(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+                                     const std::vector<bool>& allowed) {
+  constexpr int kSweeps = 2000;
+  const Eigen::Index n = b.size();
+  // Powers differ by many decades: scale to a unit diagonal.
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    scale(i) = allowed[static_cast<std::size_t>(i)] && a(i, i) > 0 ? 1 / std::sqrt(a(i, i)) : 0;
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * a * scale.asDiagonal();
+  const Eigen::VectorXd right = scale.cwiseProduct(b);
+  Eigen::VectorXd x = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd gradient = -right;  // scaled·x − right
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    double moved = 0;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (!(scale(i) > 0)) continue;
+      const double step = std::max(-gradient(i), -x(i));
+      if (step == 0) continue;
+      x(i) += step;
+      gradient += step * scaled.col(i);
+      moved = std::max(moved, std::abs(step));
+    }
+    if (moved <= 1e-9 * x.maxCoeff()) break;
+  }
+  return scale.cwiseProduct(x);
 }
 
 }  // namespace plumbline

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 namespace plumbline {
 
@@ -9,5 +10,10 @@ namespace plumbline {
 /// positive semidefinite. Exact: with four unknowns every choice of zeros is tried.
 Eigen::Vector4d nonnegative_solution(const Eigen::Matrix4d& a, const Eigen::Vector4d& b,
                                      unsigned allowed);
+
+/// The same for any number of unknowns, by descent in one coordinate after the other; exact to a
+/// part in 1e9 of the value reached.
+Eigen::VectorXd nonnegative_solution(const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
+                                     const std::vector<bool>& allowed);
 
 }  // namespace plumbline

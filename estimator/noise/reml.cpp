@@ -4,18 +4,57 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/noise/nonnegative.h"
-#include "estimator/noise/term_fit.h"
 
 namespace plumbline {
 
 namespace {
 
-constexpr unsigned kAllTerms = 0b1111;  // Q, N, B, K
-constexpr Eigen::Index kVarianceTerms = kTermR;
+constexpr double kMarkovRatio = 4;  // of neighbouring correlation times
+
+double duration_s(const SampleWindow& window) {
+  return window.step_s * static_cast<double>(window.count);
+}
+
+double square(double value) { return value * value; }
+
+/// The same process with its course over the run counted from its mean, and the variance of that
+/// mean added to all entries alike. Differences between windows are what they were, and so is all
+/// that is estimated beside a free zero; but the zero becomes the level of the whole run instead of
+/// the one at its ends, and its uncertainty still holds the wandering of that level.
+Eigen::MatrixXd about_mean_of_run(const Eigen::MatrixXd& covariance) {
+  const Eigen::VectorXd with_mean = covariance.rowwise().mean();
+  const double of_mean = with_mean.mean();
+  Eigen::MatrixXd result = covariance;
+  result.colwise() -= with_mean;
+  result.rowwise() -= with_mean.transpose();
+  result.array() += 2 * of_mean;
+  return result;
+}
 
 }  // namespace
+
+NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
+  NoiseProcesses processes;
+  auto terms = unit_covariances(windows, 0);
+  for (std::size_t term = 0; term < static_cast<std::size_t>(NoiseProcesses::kFirstMarkov); ++term)
+    processes.unit.push_back(term < kTermB ? std::move(terms[term])
+                                           : about_mean_of_run(terms[term]));
+  if (windows.empty()) return processes;
+  const double span_s =
+      windows.back().first_s + duration_s(windows.back()) - windows.front().first_s;
+  std::vector<double> dwell_s;
+  for (const SampleWindow& window : windows) dwell_s.push_back(duration_s(window));
+  std::nth_element(dwell_s.begin(), dwell_s.begin() + std::ssize(dwell_s) / 2, dwell_s.end());
+  const double shortest_s = 0.5 * dwell_s[dwell_s.size() / 2];
+  for (double tau_s = 0.7 * span_s; tau_s > shortest_s; tau_s /= kMarkovRatio) {
+    processes.decay_per_s.push_back(1 / tau_s);
+    processes.unit.push_back(about_mean_of_run(bounded_walk(windows, 1 / tau_s)));
+  }
+  return processes;
+}
 
 Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design) {
   const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
@@ -32,201 +71,232 @@ Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixX
   return result;
 }
 
+/// Where a search for the powers stands. `normal` and `right` give the scoring step: the powers
+/// that solve normal·power = right are the next estimate, and normal/2 is the information.
 struct NoisePool::Point {
-  Eigen::Vector4d power = Eigen::Vector4d::Zero();
+  Eigen::VectorXd power;
   double deviance = 0;
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d right = Eigen::Vector4d::Zero();
-  bool converged = false;
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd right;
 };
 
-NoisePool::NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
                      const Eigen::VectorXd& extra_variance)
-    : model_(model),
-      unit_(unit_covariances(windows, model.walk_decay_per_s)),
-      mean_(mean),
-      design_(design),
-      start_(noise_powers(model)) {
-  assert(mean.size() == design.rows() && mean.size() > design.cols());
-  assert(extra_variance.size() == 0 || extra_variance.size() == mean.size());
-  start_(kTermR) = 0;
-  known_ = Eigen::MatrixXd::Zero(mean.size(), mean.size());
+    : processes_(&processes), model_(model) {
+  const Eigen::Index n = processes.unit.front().rows();
+  assert(extra_variance.size() == 0 || extra_variance.size() == n);
+  known_ = Eigen::MatrixXd::Zero(n, n);
   if (extra_variance.size() > 0) known_.diagonal() += extra_variance;
-  known_.diagonal().array() += shared_rounding_variance(model);
-  pooled_ = pool();
+  own_noise_ = known_.diagonal().minCoeff() > 0;
+
+  if (model.descriptions.empty() || model.descriptions.front().bins.size() < 4) return;
+  // The record was described by walks that forget at different rates; each process takes the
+  // nearest of them. One that remembers for longer than the record lasts looks like a walk there.
+  const auto& descriptions = model.descriptions;
+  const auto bins = std::ssize(descriptions.front().bins);
+  densities_.resize(bins, processes.count());
+  const auto density = [&](std::size_t description, Eigen::Index bin) -> const Eigen::Vector4d& {
+    return descriptions[description].bins[static_cast<std::size_t>(bin)].density;
+  };
+  for (Eigen::Index bin = 0; bin < bins; ++bin)
+    densities_.row(bin).head<NoiseProcesses::kFirstMarkov>() = density(0, bin).transpose();
+  for (std::size_t m = 0; m < processes.decay_per_s.size(); ++m) {
+    std::size_t nearest = 0;
+    double distance = std::log(2.0);  // beyond the slowest by more than this: a walk
+    for (std::size_t d = 1; d < descriptions.size(); ++d) {
+      const double away =
+          std::abs(std::log(descriptions[d].walk_decay_per_s / processes.decay_per_s[m]));
+      const bool fastest_of_all = d + 1 == descriptions.size() &&
+                                  processes.decay_per_s[m] > descriptions[d].walk_decay_per_s;
+      if (away < distance || fastest_of_all) {
+        distance = away;
+        nearest = d;
+      }
+    }
+    const Eigen::Index column = NoiseProcesses::kFirstMarkov + static_cast<Eigen::Index>(m);
+    // The nearest rate is off by a factor of √2 at most; the level at low frequencies must fit.
+    const double level =
+        nearest == 0 ? 1
+                     : square(descriptions[nearest].walk_decay_per_s / processes.decay_per_s[m]);
+    for (Eigen::Index bin = 0; bin < bins; ++bin) {
+      const double same_rate = density(nearest, bin)(kTermK);
+      densities_(bin, column) =
+          std::min(level * same_rate, density(0, bin)(kTermK));  // no process exceeds the walk
+    }
+  }
 }
 
-Eigen::MatrixXd NoisePool::covariance(const NoisePowers& power) const {
+Eigen::MatrixXd NoisePool::covariance(const Eigen::VectorXd& power) const {
   Eigen::MatrixXd sum = known_;
-  for (Eigen::Index i = 0; i < kVarianceTerms; ++i)
-    if (power(i) > 0) sum += power(i) * unit_[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = 0; i < power.size(); ++i)
+    if (power(i) > 0) sum += power(i) * processes_->unit[static_cast<std::size_t>(i)];
   return sum;
 }
 
-NoisePool::Point NoisePool::evaluate(const Eigen::Vector4d& power) const {
-  Point point;
-  point.power = power;
-  if (!model_.spectrum.empty()) {
-    const Likelihood record = spectrum_likelihood(model_.spectrum, power);
-    point.deviance += record.deviance;
-    point.normal += record.normal;
-    point.right += record.right;
+void NoisePool::add_record(const Eigen::VectorXd& power, Point& point) const {
+  if (densities_.size() == 0) return;
+  const std::vector<SpectrumBin>& bins = model_.descriptions.front().bins;
+  const Eigen::VectorXd variance = densities_ * power;
+  // The straight line is profiled out; what is left of it gives back one degree of freedom.
+  double cross = 0, ramp = 0;
+  for (Eigen::Index j = 0; j < variance.size(); ++j) {
+    cross += bins[static_cast<std::size_t>(j)].cross / variance(j);
+    ramp += bins[static_cast<std::size_t>(j)].ramp / variance(j);
   }
-  NoisePowers powers = start_;
-  powers.head<kVarianceTerms>() = power;
-  const Projector projector = make_projector(covariance(powers), design_);
-  const Eigen::VectorXd py = projector.P * mean_;
-  point.deviance += projector.log_determinant + mean_.dot(py);
+  const double slope = ramp > 0 ? cross / ramp : 0;
+  const double slope_variance = ramp > 0 ? 1 / ramp : 0;
+  if (ramp > 0) point.deviance += std::log(ramp);
+  Eigen::VectorXd weight(variance.size()), mixed(variance.size()), single(variance.size()),
+      excess(variance.size());
+  for (Eigen::Index j = 0; j < variance.size(); ++j) {
+    const SpectrumBin& bin = bins[static_cast<std::size_t>(j)];
+    const double square_left =
+        std::max(0.0, bin.square - slope * (2 * bin.cross - slope * bin.ramp));
+    point.deviance += bin.count * std::log(variance(j)) + square_left / variance(j);
+    const double inverse = 1 / square(variance(j));
+    weight(j) = bin.count * inverse;
+    mixed(j) = bin.ramp * inverse / variance(j);
+    single(j) = bin.ramp * inverse;
+    excess(j) = inverse * (square_left + slope_variance * bin.ramp - bin.count * variance(j));
+  }
+  const Eigen::VectorXd once = densities_.transpose() * single;
+  const Eigen::MatrixXd normal =
+      densities_.transpose() * (weight - 2 * slope_variance * mixed).asDiagonal() * densities_ +
+      square(slope_variance) * once * once.transpose();
+  point.normal += normal;
+  point.right += densities_.transpose() * excess + normal * power;
+}
+
+NoisePool::Point NoisePool::evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
+                                     const Eigen::MatrixXd& design) const {
+  const Eigen::Index count = processes_->count();
+  Point point{power, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  add_record(power, point);
+  const Projector projector = make_projector(covariance(power), design);
+  const Eigen::VectorXd py = projector.P * mean;
+  point.deviance += projector.log_determinant + mean.dot(py);
   // The average information (Gilmour, Thompson & Cullis, 1995) has the expected one's mean and
   // costs products with vectors only.
-  Eigen::Matrix<double, Eigen::Dynamic, kVarianceTerms> seen(mean_.size(), kVarianceTerms);
-  Eigen::Vector4d score;
-  for (Eigen::Index i = 0; i < kVarianceTerms; ++i) {
-    const Eigen::MatrixXd& unit = unit_[static_cast<std::size_t>(i)];
+  Eigen::MatrixXd seen(mean.size(), count);
+  Eigen::VectorXd score(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::MatrixXd& unit = processes_->unit[static_cast<std::size_t>(i)];
     seen.col(i) = unit * py;
     score(i) = py.dot(seen.col(i)) - projector.P.cwiseProduct(unit).sum();
   }
-  const Eigen::Matrix4d normal = seen.transpose() * projector.P * seen;
+  const Eigen::MatrixXd normal = seen.transpose() * (projector.P * seen);
   point.normal += normal;
   point.right += normal * power + score;
   return point;
 }
 
-Eigen::Matrix4d NoisePool::expected_information(const Eigen::Vector4d& power) const {
-  NoisePowers powers = start_;
-  powers.head<kVarianceTerms>() = power;
-  const Eigen::MatrixXd P = make_projector(covariance(powers), design_).P;
-  std::array<Eigen::MatrixXd, kVarianceTerms> pc;
-  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
-    // Quantization is nearly diagonal: windows that touch share a little.
-    if (i == kTermB || i == kTermK)
-      pc[i].noalias() = P * unit_[i];
-    else
-      pc[i] = P * unit_[i].diagonal().asDiagonal();
-  }
-  Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
-  if (!model_.spectrum.empty()) normal = spectrum_likelihood(model_.spectrum, power).normal;
-  for (std::size_t i = 0; i < kVarianceTerms; ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      const double value = pc[i].cwiseProduct(pc[j].transpose()).sum();
-      const auto a = static_cast<Eigen::Index>(i);
-      const auto b = static_cast<Eigen::Index>(j);
-      normal(a, b) += value;
-      if (a != b) normal(b, a) += value;
+Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise,
+                                          const Eigen::MatrixXd& design) const {
+  const Eigen::Index count = processes_->count();
+  const Eigen::MatrixXd P = make_projector(noise.covariance, design).P;
+  std::vector<Eigen::MatrixXd> seen;
+  for (const Eigen::MatrixXd& unit : processes_->unit) seen.push_back(P * unit);
+  Point point{noise.power, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  add_record(noise.power, point);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const double value = seen[static_cast<std::size_t>(i)]
+                               .cwiseProduct(seen[static_cast<std::size_t>(j)].transpose())
+                               .sum();
+      point.normal(i, j) += value;
+      if (i != j) point.normal(j, i) += value;
     }
   }
-  return 0.5 * normal;
+  return 0.5 * point.normal;
 }
 
-NoisePool::Point NoisePool::maximise(const Eigen::Vector4d& start, unsigned free) const {
-  constexpr int kIterations = 40;
+Eigen::VectorXd NoisePool::starting_powers() const {
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(processes_->count());
+  power.head<NoiseProcesses::kFirstMarkov>() =
+      noise_powers(model_).head<NoiseProcesses::kFirstMarkov>();
+  // A process that the record puts at zero starts at one per cent of the white variance.
+  const Eigen::Index middle = known_.rows() / 2;
+  const auto variance = [&](Eigen::Index i) {
+    return processes_->unit[static_cast<std::size_t>(i)](middle, middle);
+  };
+  const double white = power(kTermN) * variance(kTermN) + known_(middle, middle);
+  for (Eigen::Index i = kTermB; i < power.size(); ++i)
+    if (!(power(i) > 0)) power(i) = 0.01 * white / variance(i);
+  return power;
+}
+
+PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                            const Eigen::VectorXd* start) const {
+  constexpr int kIterations = 60;
   constexpr double kEnough = 1e-2;  // of −2 ln L: far below anything a test can feel
-  Eigen::Vector4d fixed = start;
-  for (int i = 0; i < 4; ++i)
-    if ((free >> i & 1U) != 0) fixed(i) = 0;
-  Point now = evaluate(start);
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const Eigen::Vector4d target =
-        fixed + nonnegative_solution(now.normal, now.right - now.normal * fixed, free);
+  assert(mean.size() == design.rows() && mean.size() > design.cols());
+  // The means cannot tell quantization from white noise: without a record it stays at zero.
+  std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
+  free[kTermQ] = densities_.size() > 0;
+  Eigen::VectorXd first = starting_powers();
+  if (!free[kTermQ]) first(kTermQ) = 0;
+  // Powers that were found to be zero need a little to find the way back.
+  if (start != nullptr) first = start->cwiseMax(0.02 * first);
+  PooledNoise result;
+  Point now = evaluate(first, mean, design);
+  for (int iteration = 0; iteration < kIterations && !result.converged; ++iteration) {
+    const Eigen::VectorXd target = nonnegative_solution(now.normal, now.right, free);
     Point next;
     bool better = false;
     for (int quartering = 0; quartering < 5 && !better; ++quartering) {
-      const double step = std::ldexp(1.0, -2 * quartering);
-      const Eigen::Vector4d candidate = now.power + step * (target - now.power);
-      if (!(candidate(kTermQ) + candidate(kTermN) > 0)) continue;  // Σ would be singular
-      next = evaluate(candidate);
+      const Eigen::VectorXd candidate =
+          now.power + std::ldexp(1.0, -2 * quartering) * (target - now.power);
+      const bool singular = !(candidate(kTermQ) + candidate(kTermN) > 0) && !own_noise_;
+      if (singular) continue;
+      next = evaluate(candidate, mean, design);
       better = next.deviance <= now.deviance;
     }
-    if (!better) {
-      now.converged = true;  // no descent left but rounding
-      return now;
-    }
-    const double gained = now.deviance - next.deviance;
-    now = next;
-    if (gained < kEnough) {
-      now.converged = true;
-      return now;
-    }
+    result.converged = !better || now.deviance - next.deviance < kEnough;
+    if (better) now = std::move(next);
   }
-  return now;
-}
-
-PooledNoise NoisePool::pool() const {
-  Eigen::Vector4d start = start_.head<kVarianceTerms>();
-  // A term that the record puts at zero starts at one per cent of the white variance of the means.
-  const Eigen::Index middle = mean_.size() / 2;
-  const double white = start(kTermN) * unit_[kTermN](middle, middle);
-  if (!(start(kTermB) > 0)) start(kTermB) = 0.01 * white;
-  if (!(start(kTermK) > 0)) start(kTermK) = 0.01 * white / unit_[kTermK](middle, middle);
-  // The means cannot tell quantization from white noise: without a record it stays at zero.
-  const unsigned free = model_.spectrum.size() > 4 ? kAllTerms : kAllTerms & ~1U;
-  const Point best = maximise(start, free);
-  PooledNoise result;
-  result.power = start_;
-  result.power.head<kVarianceTerms>() = best.power;
-  result.walk_decay_per_s = model_.walk_decay_per_s;
-  result.covariance = covariance(result.power);
-  result.deviance = best.deviance;
-  result.converged = best.converged;
+  result.power = now.power;
+  result.deviance = now.deviance;
+  result.covariance = covariance(now.power);
   return result;
 }
 
-PooledNoise NoisePool::pooled_with_information() const {
-  PooledNoise result = pooled_;
-  result.information.topLeftCorner<kVarianceTerms, kVarianceTerms>() =
-      expected_information(result.power.head<kVarianceTerms>());
-  return result;
+NoiseModel without_record(NoiseModel model) {
+  model.descriptions.clear();
+  model.Q.value = model.N.value = model.B.value = model.K.value = 0;
+  return model;
 }
 
-NoiseModel NoisePool::model() const {
-  NoiseModel result = model_;
-  result.Q.value = std::sqrt(pooled_.power(kTermQ));
-  result.N.value = std::sqrt(pooled_.power(kTermN));
-  result.B.value = std::sqrt(pooled_.power(kTermB));
-  result.K.value = std::sqrt(pooled_.power(kTermK));
-  return result;
-}
-
-NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                    const Eigen::VectorXd& extra_variance) {
-  const std::vector<SpectrumDescription>& descriptions = model.descriptions;
-  if (descriptions.empty()) return {model, windows, mean, design, extra_variance};
-  const auto pool_at = [&](std::size_t index, NoiseModel start) {
-    start.walk_decay_per_s = descriptions[index].walk_decay_per_s;
-    start.spectrum = descriptions[index].bins;
-    return NoisePool(start, windows, mean, design, extra_variance);
+NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
+                           const PooledNoise& pooled, double span_s) {
+  const auto set = [](NoiseTerm& term, double power) {
+    term = {};
+    term.value = std::sqrt(std::max(power, 0.0));
+    term.present = power > 0;
   };
-  // Downhill from the record's own favourite; longer correlation times come first, since the run is
-  // what sees them.
-  const auto favourite =
-      std::min_element(descriptions.begin(), descriptions.end(),
-                       [](const auto& a, const auto& b) { return a.deviance < b.deviance; });
-  auto best = static_cast<std::size_t>(favourite - descriptions.begin());
-  NoiseModel first = model;
-  first.Q.value = std::sqrt(favourite->power(kTermQ));
-  first.N.value = std::sqrt(favourite->power(kTermN));
-  first.B.value = std::sqrt(favourite->power(kTermB));
-  first.K.value = std::sqrt(favourite->power(kTermK));
-  NoisePool pool = pool_at(best, first);
-  const auto descend = [&](auto next) {
-    bool moved = false;
-    for (std::size_t index = next(best); index < descriptions.size(); index = next(index)) {
-      // Powers change little from one correlation time to the next: a good place to start.
-      NoiseModel start = pool.model();
-      const double before = descriptions[best].power(kTermK);
-      if (before > 0) start.K.value *= std::sqrt(descriptions[index].power(kTermK) / before);
-      NoisePool candidate = pool_at(index, start);
-      if (candidate.pooled().deviance >= pool.pooled().deviance) break;
-      pool = std::move(candidate);
-      best = index;
-      moved = true;
-    }
-    return moved;
-  };
-  if (!descend([](std::size_t i) { return i - 1; })) descend([](std::size_t i) { return i + 1; });
-  return pool;
+  set(model.Q, pooled.power(kTermQ));
+  set(model.N, pooled.power(kTermN));
+  set(model.R, 0);
+  const auto markov = processes.decay_per_s.size();
+  std::vector<double> variance(markov);
+  for (std::size_t m = 0; m < markov; ++m)
+    variance[m] = pooled.power(NoiseProcesses::kFirstMarkov + static_cast<Eigen::Index>(m)) /
+                  (2 * processes.decay_per_s[m]);
+  const auto strongest = std::max_element(variance.begin(), variance.end());
+  double walk = pooled.power(kTermK);
+  model.walk_decay_per_s = 0;
+  if (strongest != variance.end() && *strongest > walk * span_s / 3) {
+    const auto m = static_cast<std::size_t>(strongest - variance.begin());
+    model.walk_decay_per_s = processes.decay_per_s[m];
+    walk = pooled.power(NoiseProcesses::kFirstMarkov + static_cast<Eigen::Index>(m));
+    *strongest = 0;
+  }
+  set(model.K, walk);
+  // Equal variances in every ratio of correlation times are flicker of this level.
+  double flicker = pooled.power(kTermB);
+  for (const double v : variance)
+    flicker += std::numbers::pi * v / (std::log(kMarkovRatio) * static_cast<double>(markov));
+  set(model.B, flicker);
+  return model;
 }
 
 }  // namespace plumbline

@@ -1,8 +1,7 @@
-// The noise powers of a run, learned from a static record and from the run's own residuals.
+// The noise of a run's window means, learned from a static record and from the run's own residuals.
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 #include "estimator/noise/covariance.h"
@@ -10,65 +9,72 @@
 
 namespace plumbline {
 
-/// What is known of the noise of the run's window means.
+/// The independent processes that the noise of a run is taken to consist of: quantization, white,
+/// flicker and random walk of IEEE Std 952, then first-order Gauss-Markov processes (unit driving
+/// density) whose correlation times go from a dwell to the whole run in equal ratios. What is seen
+/// of real flicker, of several relaxations or of walks that level off, is a sum of these.
+struct NoiseProcesses {
+  static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
+  std::vector<double> decay_per_s;                 ///< of the Gauss-Markov processes, slowest first
+  std::vector<Eigen::MatrixXd> unit;               ///< covariance of the window means, power 1
+
+  Eigen::Index count() const { return std::ssize(unit); }
+};
+NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows);
+
+/// What is known of the noise of the window means of one axis.
 struct PooledNoise {
-  NoisePowers power = NoisePowers::Zero();                  ///< [Q² N² B² K² R²]
-  /// Of both sources about the powers; filled by NoisePool::pooled_with_information() only.
-  NoisePowerMatrix information = NoisePowerMatrix::Zero();
-  double walk_decay_per_s = 0;  ///< of K: whether it is a walk or bounded
-  Eigen::MatrixXd covariance;   ///< n×n of the window means with these powers
-  double deviance = 0;          ///< −2 ln of the restricted likelihood but for a constant
+  Eigen::VectorXd power;       ///< one per process
+  Eigen::MatrixXd covariance;  ///< n×n of the window means with these powers
+  /// Of both sources about the powers; filled by information_of() only.
+  Eigen::MatrixXd information;
+  double deviance = 0;  ///< −2 ln of the restricted likelihood but for a constant
   bool converged = false;
 };
 
-/// Restricted maximum likelihood (Patterson & Thompson, 1971) of the noise powers given window
+/// Restricted maximum likelihood (Patterson & Thompson, 1971) of the powers, all ≥ 0, given window
 /// means y = design·β + noise, β free, times the likelihood of the record that `model` came from.
-/// Rounding stays as the model says. The ramp of the record is not carried on: over the run a slow
-/// drift is told by the run itself, and flicker and random walk take it up. A record that
-/// determines white noise well pins it; the slow terms, which a record shorter than the run barely
-/// determines, move.
+/// A record that determines white noise well pins it; the slow processes, which a record shorter
+/// than the run barely determines, move. The ramp of the record is not carried on: over the run a
+/// slow drift is told by the run itself.
 class NoisePool {
  public:
-  /// mean: n; design: n×p of full rank, n > p; extra_variance: n further known variances
-  /// (positioning, say), or empty. The arguments are copied but for `windows`.
-  NoisePool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-            const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+  /// extra_variance: n further known variances (positioning, rounding), or empty. `processes` must
+  /// outlive this.
+  NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
             const Eigen::VectorXd& extra_variance);
 
-  /// Maximum over both sources.
-  const PooledNoise& pooled() const { return pooled_; }
-  /// The same with the information about the powers, which costs two products of n×n matrices.
-  PooledNoise pooled_with_information() const;
-  /// The model that was given, with the pooled coefficients.
-  NoiseModel model() const;
-
+  /// mean: n; design: n×p of full rank, n > p. `start`: powers to begin with, or null.
+  PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                   const Eigen::VectorXd* start = nullptr) const;
+  /// Expected information about the powers at `noise`, beside `design`.
+  Eigen::MatrixXd information_of(const PooledNoise& noise, const Eigen::MatrixXd& design) const;
   /// Σ of the window means at given powers.
-  Eigen::MatrixXd covariance(const NoisePowers& power) const;
-
-  /// ∂Σ/∂power, one n×n matrix a term.
-  const std::array<Eigen::MatrixXd, kTermCount>& unit() const { return unit_; }
+  Eigen::MatrixXd covariance(const Eigen::VectorXd& power) const;
+  const NoiseProcesses& processes() const { return *processes_; }
 
  private:
   struct Point;
-  Point evaluate(const Eigen::Vector4d& power) const;
-  Eigen::Matrix4d expected_information(const Eigen::Vector4d& power) const;
-  Point maximise(const Eigen::Vector4d& start, unsigned free) const;
-  PooledNoise pool() const;
+  /// The record's restricted likelihood and its derivatives, added to `point`.
+  void add_record(const Eigen::VectorXd& power, Point& point) const;
+  Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
+                 const Eigen::MatrixXd& design) const;
+  Eigen::VectorXd starting_powers() const;
 
+  const NoiseProcesses* processes_;
   NoiseModel model_;
-  std::array<Eigen::MatrixXd, kTermCount> unit_;
-  Eigen::MatrixXd known_;  // ramp, rounding and extra variance
-  Eigen::VectorXd mean_;
-  Eigen::MatrixXd design_;
-  NoisePowers start_;
-  PooledNoise pooled_;
+  bool own_noise_ = false;     ///< extra variance makes Σ regular without white noise
+  Eigen::MatrixXd known_;      ///< extra variance
+  Eigen::MatrixXd densities_;  ///< of the record's bins, bins × processes; empty without a record
 };
 
-/// The pool with the walk, out of those that the record was described by, that describes record and
-/// run best: what a short record takes for a random walk need not go on for the whole run.
-NoisePool best_pool(const NoiseModel& model, const std::vector<SampleWindow>& windows,
-                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                    const Eigen::VectorXd& extra_variance);
+/// A model that knows nothing of the noise but leaves all of it to the run.
+NoiseModel without_record(NoiseModel model);
+
+/// The same noise in the terms that the eight-state filter knows: white noise, one walk or the
+/// strongest Gauss-Markov process in its place, and flicker for the others.
+NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
+                           const PooledNoise& pooled, double span_s);
 
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.

@@ -179,9 +179,11 @@ TEST(Calibrate, RoundingWithoutNoiseIsNotAveragedAway) {
   const Calibration result = calibrated(data);
   const double expected_mps2 = kTwelveBits.lsb_V() / std::sqrt(12.0) / 0.032 * 9.80665;
   EXPECT_NEAR(result.before.fit_pose_rms_mps2[0], expected_mps2, 0.3 * expected_mps2);
-  EXPECT_NEAR(std::sqrt(result.estimates.batch_ls[0].covariance(3, 3)),
-              1.7 * kTwelveBits.lsb_V() / std::sqrt(12.0 * 60),
-              0.5 * kTwelveBits.lsb_V() / std::sqrt(12.0 * 60));
+  // The run alone has to say that there is no slow noise, and 60 poses say so within limits.
+  const double independent_V = kTwelveBits.lsb_V() / std::sqrt(12.0 * 60);
+  const double u_U0_V = std::sqrt(result.estimates.batch_ls[0].covariance(3, 3));
+  EXPECT_GT(u_U0_V, 1.2 * independent_V);
+  EXPECT_LT(u_U0_V, 4.0 * independent_V);
 }
 
 TEST(Calibrate, IsDeterministic) {

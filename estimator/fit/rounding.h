@@ -1,0 +1,37 @@
+// Pose means freed of what a coarse converter adds to them.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "estimator/measurement.h"
+
+namespace plumbline {
+
+/// Whether noise of `sample_sd_V`, as recorded, is too small to average rounding away.
+bool is_coarse_against(const Adc& adc, double sample_sd_V);
+
+/// Readings of one axis with rounding, as a model sees it.
+struct RoundingFree {
+  Eigen::VectorXd mean_V;       ///< what the means would have been without rounding
+  Eigen::VectorXd variance_V2;  ///< of each mean, white noise of its readings included; or zero
+  /// Whether rounding matters. Then a static record, taken at one place within the step, does not
+  /// say how large the white noise of other poses is.
+  bool coarse = false;
+};
+
+/// Noise that is small against the step of the converter does not average rounding away, but what
+/// is left is a known function of the voltage (Widrow & Kollár, Quantization Noise). It is undone
+/// to first order about `expected_V`, what a model expects of the means; near the middle of a step
+/// a mean says little, and its variance grows. `sample_sd_V`: white noise of one reading as
+/// recorded. The scatter of the means about the expectation says how well the place within the step
+/// is known; a model that lacks an effect gets no correction and the whole variance of rounding.
+RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
+                              const Adc& adc, double sample_sd_V, double samples_per_mean);
+
+/// What each entry of correlated noise is expected to be given all the others, under `covariance`:
+/// r_k − (Σ⁻¹r)_k/(Σ⁻¹)_kk. Added to a model's prediction it says where in the converter's step a
+/// mean lies although the zero has drifted.
+Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
+                                     const Eigen::VectorXd& residual);
+
+}  // namespace plumbline
