@@ -90,6 +90,10 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
       const ActiveEffect removed = fewer.effects[k];
       fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
       EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening, fewer);
+      if (!without.determined) {
+        gains.push_back(0);
+        continue;
+      }
       const double gain = heldout_gain(heldout_mps2(heldout, partitions, without), with, floor_mps2,
                                        axes_of(removed));
       // One pose's own error cannot be predicted from other poses.

@@ -230,7 +230,8 @@ class Search {
     std::vector<Scored> ranked =
         screen(list_, gains, gains.of(stage_.fit.whitened_residual).col(0));
     std::erase_if(ranked, [&](const Scored& s) {
-      return std::count(dropped_.begin(), dropped_.end(), list_.candidates[s.candidate].family) > 0;
+      const Candidate& c = list_.candidates[s.candidate];
+      return std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c);
     });
     if (ranked.empty()) return false;
     // The number of looks hardly changes while the model grows.
@@ -290,6 +291,17 @@ class Search {
       }
     }
     return false;
+  }
+
+  /// An effect stands in the model once; a second pose, slip or step is another matter.
+  bool is_chosen(const Candidate& candidate) const {
+    const auto infos = candidate.effect->parameters();
+    if (std::any_of(infos.begin(), infos.end(),
+                    [](const auto& info) { return info.role == ParameterRole::index; }))
+      return false;
+    return std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
+      return list_.candidates[k].family == candidate.family;
+    });
   }
 
   void move_to_back(std::size_t removed, std::size_t candidate, double p) {

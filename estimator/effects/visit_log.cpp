@@ -65,7 +65,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
   for (const Covariate& covariate : samples.covariates) {
     log.covariate_names.push_back(covariate.name);
   }
-  int direction = 0;
+  std::array<int, 2> direction{};
   for (const Pose& pose : set.poses) {
     assert(pose.count > 0);
     Visit visit;
@@ -83,10 +83,10 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
       visit.temperature_K = mean_of(samples.temp_C, pose) - description.reference_C;
     }
     if (!log.visits.empty()) {
-      // The shorter way round.
-      const double turn =
-          std::remainder(visit.delta_rad - log.visits.back().delta_rad, 2 * std::numbers::pi);
-      if (turn != 0) direction = turn > 0 ? 1 : -1;
+      const double commanded = visit.delta_rad - log.visits.back().delta_rad;
+      const double turn[] = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
+      for (std::size_t way = 0; way < direction.size(); ++way)
+        if (turn[way] != 0) direction[way] = turn[way] > 0 ? 1 : -1;
     }
     visit.delta_direction = direction;
     for (const Covariate& covariate : samples.covariates) {
@@ -96,11 +96,12 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.visits.push_back(std::move(visit));
   }
   // Before the first turn the head came from its home position, like for that turn.
-  const auto turned = std::find_if(log.visits.begin(), log.visits.end(),
-                                   [](const Visit& v) { return v.delta_direction != 0; });
-  if (turned != log.visits.end()) {
+  for (std::size_t way = 0; way < direction.size(); ++way) {
+    const auto turned = std::find_if(log.visits.begin(), log.visits.end(),
+                                     [&](const Visit& v) { return v.delta_direction[way] != 0; });
+    if (turned == log.visits.end()) continue;
     std::for_each(log.visits.begin(), turned,
-                  [&](Visit& v) { v.delta_direction = turned->delta_direction; });
+                  [&](Visit& v) { v.delta_direction[way] = turned->delta_direction[way]; });
   }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     log.sample_sd_V[i] = white_scatter_V(set, i);
