@@ -4,12 +4,14 @@
 
 #include <cmath>
 
+#include "app/certificate/certificate_files.h"
 #include "app/config/run_description.h"
 #include "app/io/csv.h"
 #include "app/io/evaluation_json.h"
 #include "app/io/output_folder.h"
 #include "app/io/result_json.h"
 #include "app/io/sha256.h"
+#include "app/issue_time.h"
 #include "app/summary.h"
 
 namespace plumbline::app {
@@ -54,16 +56,21 @@ bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limit
 Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& outcome,
                            OutputFolder& folder) {
   Provenance provenance = job.provenance;
-  provenance.created_utc = utc_now();
+  provenance.created_utc = issue_time_utc();
   const std::string result = file_text(result_json(outcome.calibration, provenance));
   if (auto done = folder.write("result.json", result); !done) return done;
-  const std::string certificate = write_html(
-      make_certificate({.description = job.description,
-                        .calibration = outcome.calibration,
-                        .provenance = provenance,
-                        .verification = outcome.verification ? &*outcome.verification : nullptr,
-                        .events = job.events}));
-  if (auto done = folder.write("certificate.html", certificate); !done) return done;
+  const CertificateInput certificate{
+      .description = job.description,
+      .calibration = outcome.calibration,
+      .provenance = provenance,
+      .verification = outcome.verification ? &*outcome.verification : nullptr,
+      .events = job.events,
+      .laboratory = job.style.laboratory,
+      .language = job.style.language,
+      .result_sha256 = sha256(result),
+      .started_utc = job.started_utc,
+      .finished_utc = job.finished_utc};
+  if (auto done = write_certificate(certificate, folder); !done) return done;
   if (outcome.verification) {
     const Json json = evaluation_json(*outcome.verification, 0, job.description.limits, provenance);
     if (auto done = folder.write("evaluation.json", file_text(json)); !done) return done;
@@ -115,6 +122,8 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   job.description = *std::move(description);
   job.description.dut.serial = summary.header.serial;
   job.provenance.dut = job.description.dut;
+  job.started_utc = summary.header.started_utc;
+  job.finished_utc = summary.finished_utc;
   job.run = std::move(stored->grid);
   job.static_record = std::move(stored->soak);
   job.verification = std::move(stored->verification);

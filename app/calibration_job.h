@@ -16,6 +16,12 @@
 
 namespace plumbline::app {
 
+/// What a certificate says and how, beside what was measured.
+struct CertificateStyle {
+  Laboratory laboratory;
+  Language language = Language::en;
+};
+
 /// Everything that a calibration needs, wherever it was read.
 struct CalibrationJob {
   RunDescription description;
@@ -23,8 +29,11 @@ struct CalibrationJob {
   SampleTable static_record;    ///< no rows: none
   MeasurementSet verification;  ///< fresh poses off the grid; no poses: none
   std::vector<CertificateEvent> events;
-  Provenance provenance;  ///< unit, input hashes, seed
-  std::string source;     ///< what was read, for messages
+  Provenance provenance;    ///< unit, input hashes, seed
+  std::string source;       ///< what was read, for messages
+  std::string started_utc;  ///< of a stored run; empty: not known
+  std::string finished_utc;
+  CertificateStyle style;
 };
 
 struct CalibrationFiles {
@@ -46,9 +55,9 @@ struct CalibrationOutcome {
   std::string summary;                  ///< for a person; the last line says what came out
 };
 
-/// Calibrates and writes result.json, the certificate and, with verification poses, evaluation.json
-/// into `out`: all of them or, on failure, none. Refuses poses that do not determine the twelve
-/// parameters, naming the unobservable direction.
+/// Calibrates and writes result.json, the certificate in its forms and, with verification poses,
+/// evaluation.json into `out`: all of them or, on failure, none. Refuses poses that do not
+/// determine the twelve parameters, naming the unobservable direction.
 Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesystem::path& out);
 
 }  // namespace plumbline::app

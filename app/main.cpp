@@ -64,6 +64,7 @@ int run(int argc, char** argv) {
   add_plan(program, invocation);
   add_runs(program, invocation);
   add_export(program, invocation);
+  add_verify(program, invocation);
   add_help(program, invocation);
 
   try {

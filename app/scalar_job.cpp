@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "app/axis_columns.h"
+#include "app/certificate/certificate_files.h"
 #include "app/certificate/scalar_certificate.h"
 #include "app/config/run_description.h"
 #include "app/io/csv.h"
@@ -10,6 +11,7 @@
 #include "app/io/output_folder.h"
 #include "app/io/scalar_json.h"
 #include "app/io/sha256.h"
+#include "app/issue_time.h"
 #include "app/scalar_summary.h"
 #include "estimator/scalar/rest_detector.h"
 
@@ -109,7 +111,7 @@ Result<ScalarOutcome> calibrate_scalar_files(const ScalarFiles& files,
                 files.samples.string() + ": " + calibration.error().message);
   }
   Provenance provenance{
-      .dut = description->dut, .input_sha256 = {}, .created_utc = utc_now(), .seed = seed};
+      .dut = description->dut, .input_sha256 = {}, .created_utc = issue_time_utc(), .seed = seed};
   for (const auto& file : {files.samples, files.config}) {
     auto hash = sha256_of_file(file);
     if (!hash) return fail(hash.error());
@@ -118,9 +120,11 @@ Result<ScalarOutcome> calibrate_scalar_files(const ScalarFiles& files,
   const ScalarSource source{rests->how, unit_of_column((*columns)[0]), *columns};
   const Json json = scalar_json(*calibration, source, provenance);
   if (auto done = folder->write("result.json", file_text(json)); !done) return fail(done.error());
-  const std::string page =
-      write_html(make_scalar_certificate({*description, *calibration, source, provenance}));
-  if (auto done = folder->write("certificate.html", page); !done) return fail(done.error());
+  const Document document =
+      make_scalar_certificate({*description, *calibration, source, provenance});
+  if (auto done = write_pages(document, provenance.created_utc, *folder); !done) {
+    return fail(done.error());
+  }
   if (auto done = folder->publish(); !done) return fail(done.error());
 
   ScalarOutcome outcome{*std::move(calibration), ExitCode::done, {}};

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "app/certificate/rounding.h"
+#include "estimator/decision.h"
 
 namespace plumbline::app {
 
@@ -76,22 +77,6 @@ std::string error_rows(const Calibration& calibration,
   return rows;
 }
 
-std::string decision_words(const Decision& decision) {
-  switch (decision.status) {
-    case DecisionStatus::pass:
-      return "PASS";
-    case DecisionStatus::conditional_pass:
-      return "CONDITIONAL PASS";
-    case DecisionStatus::conditional_fail:
-      return "CONDITIONAL FAIL";
-    case DecisionStatus::fail:
-      return "FAIL";
-    case DecisionStatus::none:
-      break;
-  }
-  return "no limit given";
-}
-
 /// The axis whose residual stands out most against the floor.
 std::size_t worst_axis(const Calibration& calibration) {
   const auto ratio = [&](std::size_t axis) {
@@ -140,7 +125,7 @@ std::string conclusion(const RunDescription& description, const Calibration& cal
   }
   const Decision& decision = calibration.decision;
   if (decision.status != DecisionStatus::none) {
-    text += fmt::format("; {}: largest error {} m/s², limit {} m/s²", decision_words(decision),
+    text += fmt::format("; {}: largest error {} m/s², limit {} m/s²", to_words(decision.status),
                         significant(decision.max_abs_error_mps2, 2),
                         significant(decision.limit_mps2, 3));
   }
@@ -160,7 +145,7 @@ std::string summary(const RunDescription& description, const Calibration& calibr
   text += error_rows(calibration, verification);
   text += fmt::format("diagnosis: {}: {}\n", to_string(calibration.diagnosis.verdict),
                       calibration.diagnosis.reason);
-  text += fmt::format("decision: {}\n", decision_words(calibration.decision));
+  text += fmt::format("decision: {}\n", to_words(calibration.decision.status));
   return text + conclusion(description, calibration, verification) + "\n";
 }
 

@@ -20,6 +20,22 @@ const char* to_string(DecisionStatus status) {
   return "none";
 }
 
+const char* to_words(DecisionStatus status) {
+  switch (status) {
+    case DecisionStatus::pass:
+      return "PASS";
+    case DecisionStatus::conditional_pass:
+      return "CONDITIONAL PASS";
+    case DecisionStatus::conditional_fail:
+      return "CONDITIONAL FAIL";
+    case DecisionStatus::fail:
+      return "FAIL";
+    case DecisionStatus::none:
+      break;
+  }
+  return "NO LIMIT STATED";
+}
+
 Decision decide(double limit_mps2, double max_abs_error_mps2, double u_mps2) {
   assert(limit_mps2 > 0 && max_abs_error_mps2 >= 0 && u_mps2 >= 0);
   Decision decision;

@@ -11,4 +11,7 @@ namespace plumbline {
 /// Preconditions: all arguments ≥ 0 and finite, limit > 0.
 Decision decide(double limit_mps2, double max_abs_error_mps2, double u_mps2);
 
+/// As people write it: "CONDITIONAL PASS"; "NO LIMIT STATED" without a limit.
+const char* to_words(DecisionStatus status);
+
 }  // namespace plumbline

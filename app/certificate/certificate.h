@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "app/certificate/document.h"
+#include "app/certificate/language.h"
+#include "app/config/laboratory.h"
 #include "app/provenance.h"
 #include "estimator/calibrate.h"
 
@@ -17,18 +19,43 @@ struct CertificateEvent {
   std::string text;
 };
 
+/// An effect that was looked for and not found, and how large it would have had to be.
+struct NotFound {
+  std::string id;
+  std::vector<std::size_t> axes;  ///< empty: all
+  std::string parameter;
+  double limit = 0;
+  std::string unit;
+};
+
 struct CertificateInput {
   const RunDescription& description;
   const Calibration& calibration;
   const Provenance& provenance;
   const Evaluation* verification = nullptr;  ///< fresh poses of the same run, when there were any
   std::vector<CertificateEvent> events;
+  Laboratory laboratory = {};
+  Language language = Language::en;
+  std::string result_sha256 = {};  ///< of result.json; empty: not printed
+  std::string started_utc = {};    ///< of a stored run; empty: not known
+  std::string finished_utc = {};
+  std::vector<NotFound> not_found = {};
 };
 
 /// "PL-A-0017-20260131-1a2b3c4d": serial, date, and the first digits of the hash over the inputs.
 std::string certificate_id(const Provenance& provenance);
 
-/// The document in reading order. `input.calibration` must have full rank.
+/// First and last day of the measurement, as far as known: what lab.toml says, else what the stored
+/// run says, else empty.
+struct PerformanceDates {
+  std::string from;
+  std::string to;
+};
+PerformanceDates performance_dates(const CertificateInput& input);
+
+/// The document in reading order. `input.calibration` must have full rank. `tr` decides the
+/// language; input.language is what callers make it from.
+Document make_certificate(const CertificateInput& input, const Translator& tr);
 Document make_certificate(const CertificateInput& input);
 
 /// One self-contained page: style and pictures inside, no scripts, prints on A4 with the

@@ -30,6 +30,7 @@ struct Table {
   std::string caption;
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;  ///< the first column is a label
+  std::vector<std::size_t> word_columns = {};  ///< further columns that hold words, not numbers
 };
 
 struct Figure {
@@ -42,7 +43,17 @@ struct Figure {
 
 using Block = std::variant<Heading, Paragraph, Facts, Table, Figure>;
 
+/// What the writers themselves say, in the language of the document.
+struct DocumentWords {
+  std::string missing = "not stated";
+  std::string page_of = "page {} of {}";  ///< page number, number of pages
+  std::string end;                        ///< the end mark
+  std::string fingerprint;                ///< the line that states Document::fingerprint
+};
+
 struct Document {
+  std::string language = "en";  ///< ISO 639-1
+  DocumentWords words;
   std::string title;
   std::string subtitle;
   std::string id;                    ///< unique, printed on every page
@@ -50,7 +61,8 @@ struct Document {
   std::vector<std::string> summary;  ///< sentences under the headline
   Tone tone = Tone::plain;           ///< of the headline: warning when something is out of order
   std::vector<Block> blocks;
-  std::string colophon;  ///< last line, before the end mark
+  std::string colophon;     ///< last line, before the end mark
+  std::string fingerprint;  ///< SHA-256 of the words from `id` to the last block (fingerprint.h)
 };
 
 }  // namespace plumbline::app

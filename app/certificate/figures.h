@@ -1,20 +1,33 @@
 // The pictures of a certificate.
 #pragma once
 
+#include <memory>
+
 #include "app/certificate/document.h"
+#include "app/certificate/language.h"
 #include "estimator/calibrate.h"
 
 namespace plumbline::app {
 
-/// Residual of every pose over δ × h, one map per axis, one colour scale for the three (m/s²).
-Figure residual_map(const Calibration& calibration, const Grid& grid);
+struct FigureContext {
+  std::shared_ptr<const Calibration> calibration;  ///< never null
+  Translator tr;
+};
+
+/// Residual of every pose over δ × h, one map per axis, one colour scale for all (m/s²); before and
+/// after side by side when effects were added.
+Figure residual_map(const FigureContext& context, const Grid& grid);
 /// Residuals in units of what the noise alone would leave, beside the normal distribution.
-Figure residual_histogram(const Calibration& calibration);
-/// Overlapping Allan deviation of each output with the fitted terms.
-Figure allan_figure(const Calibration& calibration);
-/// Estimates of the twelve parameters against the number of positions, three estimators.
-Figure convergence_figure(const Calibration& calibration);
+Figure residual_histogram(const FigureContext& context);
 /// Residual against the time of the run, and against temperature when it was recorded.
-Figure residual_course(const Calibration& calibration);
+Figure residual_course(const FigureContext& context);
+/// Overlapping Allan deviation of each output with the fitted terms.
+Figure allan_figure(const FigureContext& context);
+/// Estimates of the twelve parameters against the number of positions, three estimators.
+Figure convergence_figure(const FigureContext& context);
+/// What the variance of each scale factor and offset is made of, as bars.
+Figure budget_figure(const FigureContext& context, const RunDescription& description);
+/// What each added effect removes of the excess error on left-out poses, with its p-value.
+Figure evidence_figure(const FigureContext& context);
 
 }  // namespace plumbline::app

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "app/certificate/certificate.h"
+#include "app/certificate/table_columns.h"
 #include "app/figure/svg_canvas.h"
 
 namespace plumbline::app {
@@ -9,7 +10,7 @@ namespace {
 constexpr const char* kStyle = R"css(
 @page { size: A4; margin: 16mm 15mm 18mm 15mm;
   @bottom-left { content: "%ID%"; font: 8pt Helvetica, Arial, sans-serif; color: #444; }
-  @bottom-right { content: "page " counter(page) " of " counter(pages);
+  @bottom-right { content: %PAGE%;
                   font: 8pt Helvetica, Arial, sans-serif; color: #444; } }
 * { box-sizing: border-box; }
 body { font: 14px/1.45 Helvetica, Arial, "Liberation Sans", sans-serif; color: #222;
@@ -33,7 +34,7 @@ caption { text-align: left; font-weight: bold; padding: 4px 0; }
 th, td { padding: 3px 6px; border-bottom: 1px solid #ddd; text-align: right;
          font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
 thead th { border-bottom: 1.5px solid #222; vertical-align: bottom; }
-th:first-child, td:first-child, table.words td, table.words th { text-align: left; }
+th:first-child, td:first-child, td.words, th.words { text-align: left; }
 dl { display: grid; grid-template-columns: 200px 1fr; gap: 3px 14px; margin: 8px 0 14px; }
 dt { color: #444; }
 dd { margin: 0; overflow-wrap: anywhere; }
@@ -42,22 +43,36 @@ figure { margin: 16px 0 20px; break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; display: block; }
 figcaption { font-size: 12.5px; color: #444; margin-top: 4px; }
 footer { border-top: 1px solid #999; margin-top: 28px; padding-top: 8px; font-size: 12.5px; }
+p.fingerprint { color: #555; overflow-wrap: anywhere; }
 .end { text-align: center; letter-spacing: .12em; margin-top: 10px; }
 @media print { body { margin: 0; padding: 0; max-width: none; font-size: 10pt; } }
 )css";
 
-std::string style(const std::string& id) {
-  std::string text = kStyle;
-  // Inside a CSS string, so quotes and backslashes of a serial number must not end it.
+/// Inside a CSS string, so quotes and backslashes of a serial number must not end it.
+std::string css_safe(const std::string& text) {
   std::string safe;
-  for (char c : id) {
-    if (c == '"' || c == '\\' || c == '<' || c == '\n') {
+  for (const char c : text) {
+    if (c == '"' || c == '\\' || c == '<' || c == '&' || c == '\n') {
       safe += '_';
     } else {
       safe += c;
     }
   }
-  return text.replace(text.find("%ID%"), 4, safe);
+  return safe;
+}
+
+/// "page {} of {}" as a CSS content value.
+std::string page_counter(const std::string& words) {
+  const std::size_t first = words.find("{}"), second = words.find("{}", first + 2);
+  return fmt::format(
+      "\"{}\" counter(page) \"{}\" counter(pages) \"{}\"", css_safe(words.substr(0, first)),
+      css_safe(words.substr(first + 2, second - first - 2)), css_safe(words.substr(second + 2)));
+}
+
+std::string style(const Document& document) {
+  std::string text = kStyle;
+  text.replace(text.find("%ID%"), 4, css_safe(document.id));
+  return text.replace(text.find("%PAGE%"), 6, page_counter(document.words.page_of));
 }
 
 const char* tone_class(Tone tone) {
@@ -73,8 +88,14 @@ const char* tone_class(Tone tone) {
 }
 
 struct HtmlWriter {
-  std::string text;
+  const DocumentWords& words;
+  std::string text = {};
   int figures = 0;
+
+  /// Numbers stand on the right; the first column is left by the style.
+  static const char* side(const Table& table, std::size_t column) {
+    return column > 0 && column_anchor(table, column) == Anchor::start ? " class=\"words\"" : "";
+  }
 
   void operator()(const Heading& heading) {
     text += fmt::format("<h2>{}</h2>\n", escape_xml(heading.text));
@@ -87,20 +108,24 @@ struct HtmlWriter {
     text += "<dl>\n";
     for (const auto& [label, value] : facts.rows) {
       text += fmt::format("<dt>{}</dt>", escape_xml(label));
-      text += value.empty() ? std::string("<dd class=\"missing\">not stated</dd>\n")
-                            : fmt::format("<dd>{}</dd>\n", escape_xml(value));
+      text += value.empty()
+                  ? fmt::format("<dd class=\"missing\">{}</dd>\n", escape_xml(words.missing))
+                  : fmt::format("<dd>{}</dd>\n", escape_xml(value));
     }
     text += "</dl>\n";
   }
   void operator()(const Table& table) {
     text += fmt::format("<table>\n<caption>{}</caption>\n<thead><tr>", escape_xml(table.caption));
-    for (const auto& cell : table.header) {
-      text += fmt::format("<th scope=\"col\">{}</th>", escape_xml(cell));
+    for (std::size_t c = 0; c < table.header.size(); ++c) {
+      text +=
+          fmt::format("<th scope=\"col\"{}>{}</th>", side(table, c), escape_xml(table.header[c]));
     }
     text += "</tr></thead>\n<tbody>\n";
     for (const auto& row : table.rows) {
       text += "<tr>";
-      for (const auto& cell : row) text += fmt::format("<td>{}</td>", escape_xml(cell));
+      for (std::size_t c = 0; c < row.size(); ++c) {
+        text += fmt::format("<td{}>{}</td>", side(table, c), escape_xml(row[c]));
+      }
       text += "</tr>\n";
     }
     text += "</tbody>\n</table>\n";
@@ -117,14 +142,14 @@ struct HtmlWriter {
 }  // namespace
 
 std::string write_html(const Document& document) {
-  HtmlWriter writer;
+  HtmlWriter writer{document.words};
   writer.text = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<!DOCTYPE html>\n<html lang=\"{4}\">\n<head>\n<meta charset=\"utf-8\"/>\n"
+      "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
       "<title>{0} {1}</title>\n<style>{2}</style>\n</head>\n<body>\n<header>\n"
       "<span class=\"id\">{1}</span>\n<h1>{0}</h1>\n<p>{3}</p>\n</header>\n",
-      escape_xml(document.title), escape_xml(document.id), style(document.id),
-      escape_xml(document.subtitle));
+      escape_xml(document.title), escape_xml(document.id), style(document),
+      escape_xml(document.subtitle), document.language);
   writer.text += fmt::format("<section class=\"verdict {}\"><strong>{}</strong>\n",
                              tone_class(document.tone), escape_xml(document.headline));
   for (const auto& sentence : document.summary) {
@@ -133,9 +158,10 @@ std::string write_html(const Document& document) {
   writer.text += "</section>\n";
   for (const Block& block : document.blocks) std::visit(writer, block);
   writer.text += fmt::format(
-      "<footer><p>{}</p><p class=\"end\">— end of certificate {} "
-      "—</p></footer>\n</body>\n</html>\n",
-      escape_xml(document.colophon), escape_xml(document.id));
+      "<footer><p>{}</p><p class=\"fingerprint\">{}</p><p class=\"end\">{}</p></footer>\n"
+      "</body>\n</html>\n",
+      escape_xml(document.colophon), escape_xml(document.words.fingerprint),
+      escape_xml(document.words.end));
   return writer.text;
 }
 

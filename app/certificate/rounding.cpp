@@ -16,7 +16,23 @@ std::string with_minus(std::string text) {
   return text;
 }
 
+std::string superscript(int number) {
+  static constexpr const char* kDigits[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string text = number < 0 ? "⁻" : "";
+  for (const char digit : fmt::format("{}", std::abs(number))) text += kDigits[digit - '0'];
+  return text;
+}
+
 }  // namespace
+
+std::string difference_beside(double difference, double expanded) {
+  if (!std::isfinite(difference) || !(expanded > 0) || !std::isfinite(expanded)) {
+    return significant(difference, 2);
+  }
+  // Two places more than the uncertainty has: what is smaller does not matter.
+  const int place = static_cast<int>(std::floor(std::log10(expanded))) - 3;
+  return with_minus(fmt::format("{:.{}f}", difference, std::max(0, -place)));
+}
 
 std::string significant(double value, int digits) {
   if (!std::isfinite(value)) return "–";
@@ -25,7 +41,7 @@ std::string significant(double value, int digits) {
   if (exponent < -5 || exponent >= 7) {
     const std::string mantissa =
         with_minus(fmt::format("{:.{}f}", value / std::pow(10.0, exponent), digits - 1));
-    return fmt::format("{}·10^{}", mantissa, exponent);
+    return fmt::format("{}·10{}", mantissa, superscript(exponent));
   }
   return with_minus(fmt::format("{:.{}f}", value, std::max(0, digits - 1 - exponent)));
 }

@@ -18,6 +18,10 @@ RoundedResult round_result(double value, double expanded);
 /// "(32.0021 ± 0.0012) mV/g"
 std::string result_with_unit(double value, double expanded, const std::string& unit);
 
+/// A difference of two estimates, to two places more than the uncertainty that it is compared with
+/// is printed to.
+std::string difference_beside(double difference, double expanded);
+
 /// `value` with so many significant digits, without exponent where it reads well.
 std::string significant(double value, int digits);
 

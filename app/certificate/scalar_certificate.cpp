@@ -167,6 +167,7 @@ Document make_scalar_certificate(const ScalarCertificateInput& input) {
   document.subtitle = fmt::format("Accelerometer triad, serial number {}; scalar calibration",
                                   input.description.dut.serial);
   document.id = certificate_id(input.provenance);
+  document.words.end = fmt::format("— end of certificate {} —", document.id);
   const Verdict verdict = calibration.diagnosis.verdict;
   const bool suspicious = verdict == Verdict::unexplained || verdict == Verdict::partly_explained;
   const bool failed = calibration.decision.status == DecisionStatus::fail ||

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "app/calibration_job.h"
+#include "app/command/certificate_options.h"
 #include "app/command/command.h"
 #include "app/scalar_job.h"
 
@@ -17,6 +18,7 @@ struct CalibrateOptions {
   std::uint64_t seed = 1;
   bool scalar = false;
   ScalarFiles scalar_files;
+  CertificateOptions certificate;
 };
 
 Result<CalibrationJob> job_of(const CalibrateOptions& options) {
@@ -47,8 +49,11 @@ Result<ExitCode> run_scalar(const CalibrateOptions& options) {
 
 Result<ExitCode> run_calibrate(const CalibrateOptions& options) {
   if (options.scalar) return run_scalar(options);
-  const auto job = job_of(options);
+  auto style = certificate_style(options.certificate);
+  if (!style) return fail(style.error());
+  auto job = job_of(options);
   if (!job) return fail(job.error());
+  job->style = *std::move(style);
   const auto outcome = perform(*job, options.out);
   if (!outcome) return fail(outcome.error());
   std::cout << outcome->summary;
@@ -82,6 +87,7 @@ void add_calibrate(CLI::App& program, Invocation& invocation) {
   sub->add_option("--out", options->out,
                   "Folder for result.json and the certificate; created when absent")
       ->required();
+  add_certificate_options(*sub, options->certificate);
   sub->add_option("--seed", options->seed, "Seed of everything random (default 1)");
   auto* scalar =
       sub->add_flag("--scalar", options->scalar,

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "app/command/certificate_options.h"
 #include "app/command/command.h"
 #include "app/command/measure.h"
 #include "app/config/rig_description.h"
@@ -29,6 +30,7 @@ struct DryRunArguments {
   std::string world;
   double speed = 60;
   std::uint64_t seed = 1;
+  CertificateOptions certificate;
 };
 
 Result<RigDescription> rig_description(const DryRunArguments& arguments) {
@@ -41,6 +43,8 @@ Result<RigDescription> rig_description(const DryRunArguments& arguments) {
 Result<ExitCode> dry_run(const DryRunArguments& arguments) {
   auto rig = rig_description(arguments);
   if (!rig) return fail(rig.error());
+  const auto style = certificate_style(arguments.certificate);
+  if (!style) return fail(style.error());
   std::string world = kDefaultWorld;
   if (!arguments.world.empty()) {
     auto text = read_file(arguments.world);
@@ -68,6 +72,7 @@ Result<ExitCode> dry_run(const DryRunArguments& arguments) {
       {.session = {.rig = *rig, .database = fs::path(arguments.out) / "run.db", .resume = false},
        .out = arguments.out,
        .seed = arguments.seed,
+       .style = *style,
        .resume_hint = hint});
 }
 
@@ -86,6 +91,7 @@ void add_dry_run(CLI::App& program, Invocation& invocation) {
       ->capture_default_str();
   sub->add_option("--seed", arguments->seed, "of everything random in the world and the results")
       ->capture_default_str();
+  add_certificate_options(*sub, arguments->certificate);
   sub->callback([arguments, &invocation] {
     invocation.action = [arguments] { return dry_run(*arguments); };
   });

@@ -59,8 +59,9 @@ Result<storage::RunId> measure(const MeasureRequest& request) {
 Result<ExitCode> measure_and_calibrate(const MeasureRequest& request) {
   const auto run = measure(request);
   if (!run) return fail(run.error());
-  const auto job = job_from_database(request.session.database, *run, request.seed);
+  auto job = job_from_database(request.session.database, *run, request.seed);
   if (!job) return fail(job.error());
+  job->style = request.style;
   const auto outcome = perform(*job, request.out);
   if (!outcome) return fail(outcome.error());
   fmt::print("run {} in {}\n{}\n", *run, request.session.database.string(), outcome->summary);

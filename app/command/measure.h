@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 
+#include "app/calibration_job.h"
 #include "app/exit_code.h"
 #include "app/sequencer/session.h"
 
@@ -12,7 +13,8 @@ namespace plumbline::app {
 struct MeasureRequest {
   SessionRequest session;
   std::filesystem::path out;
-  std::uint64_t seed = 1;   ///< of the calibration
+  std::uint64_t seed = 1;  ///< of the calibration
+  CertificateStyle style;
   std::string resume_hint;  ///< the command that goes on with a run that has ended early
 };
 

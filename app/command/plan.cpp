@@ -3,13 +3,13 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "app/command/command.h"
 #include "app/config/rig_description.h"
+#include "app/io/files.h"
 #include "app/sequencer/plan.h"
 
 namespace plumbline::app {
@@ -30,14 +30,6 @@ std::string minutes(double seconds) {
   return fmt::format("{} min {:02} s", whole / 60, whole % 60);
 }
 
-Result<void> write_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) return fail(ErrorCode::output, fmt::format("{}: cannot be written", path));
-  return {};
-}
-
 Result<ExitCode> show_plan(const PlanArguments& arguments) {
   const auto rig = read_rig_description(arguments.config);
   if (!rig) return fail(rig.error());
@@ -53,7 +45,7 @@ Result<ExitCode> show_plan(const PlanArguments& arguments) {
   }
   if (arguments.print) fmt::print("{}", to_csv(plan));
   if (!arguments.csv.empty()) {
-    if (auto written = write_text(arguments.csv, to_csv(plan)); !written) {
+    if (auto written = write_file_atomically(arguments.csv, to_csv(plan)); !written) {
       return fail(written.error());
     }
   }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "app/command/certificate_options.h"
 #include "app/command/command.h"
 #include "app/command/measure.h"
 #include "app/config/rig_description.h"
@@ -20,11 +21,14 @@ struct RunArguments {
   std::string database;
   std::string out;
   bool resume = false;
+  CertificateOptions certificate;
 };
 
 Result<ExitCode> run(const RunArguments& arguments) {
   auto rig = read_rig_description(arguments.config);
   if (!rig) return fail(rig.error());
+  const auto style = certificate_style(arguments.certificate);
+  if (!style) return fail(style.error());
   if (!arguments.serial.empty()) rig->run.dut.serial = arguments.serial;
   // An unwritable place is refused before the hours of measuring, not after them.
   if (auto folder = OutputFolder::prepare(arguments.out); !folder) return fail(folder.error());
@@ -34,6 +38,7 @@ Result<ExitCode> run(const RunArguments& arguments) {
   return measure_and_calibrate(
       {.session = {.rig = *rig, .database = arguments.database, .resume = arguments.resume},
        .out = arguments.out,
+       .style = *style,
        .resume_hint = hint});
 }
 
@@ -49,6 +54,7 @@ void add_run(CLI::App& program, Invocation& invocation) {
   sub->add_option("--db", arguments->database, "run database, made when absent")->required();
   sub->add_option("--out", arguments->out, "folder for results and certificate")->required();
   sub->add_flag("--resume", arguments->resume, "go on with the unit's last unfinished run");
+  add_certificate_options(*sub, arguments->certificate);
   sub->callback(
       [arguments, &invocation] { invocation.action = [arguments] { return run(*arguments); }; });
 }

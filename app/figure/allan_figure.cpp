@@ -13,6 +13,9 @@ namespace plumbline::app {
 namespace {
 
 constexpr std::array kColors = {palette::kBlue, palette::kOrange, palette::kGreen};
+/// Apart in black and white too.
+const std::array<std::vector<double>, kColors.size()> kDashes = {
+    std::vector<double>{}, std::vector<double>{7, 3}, std::vector<double>{2, 2.5}};
 constexpr double kMarginLeft = 62, kMarginRight = 14, kMarginTop = 30, kMarginBottom = 42;
 
 /// Whole decades around all positive values; one decade when there is none.
@@ -48,7 +51,7 @@ void append(std::vector<double>& all, const std::vector<double>& some) {
 }  // namespace
 
 void draw_allan(Canvas& canvas, Point top_left, double width, double height,
-                const std::vector<AllanSeries>& series, const std::string& unit) {
+                const std::vector<AllanSeries>& series, const AllanLabels& labels) {
   std::vector<double> taus;
   std::vector<double> values;
   for (const AllanSeries& s : series) {
@@ -58,22 +61,23 @@ void draw_allan(Canvas& canvas, Point top_left, double width, double height,
   }
   Plot plot(canvas, {top_left.x + kMarginLeft, top_left.y + kMarginTop},
             width - kMarginLeft - kMarginRight, height - kMarginTop - kMarginBottom,
-            decades("averaging time τ, s", taus),
-            decades("overlapping Allan deviation, " + unit, values));
+            decades(labels.tau, taus), decades(labels.deviation, values));
   plot.draw_frame();
   std::vector<LegendEntry> legend;
   for (std::size_t i = 0; i < series.size(); ++i) {
     const NoiseModel& noise = *series[i].noise;
     const std::string color = kColors[i % kColors.size()];
-    plot.band(noise.oadev.tau_s, noise.oadev.lower, drawable_upper(noise.oadev), color, 0.2);
-    plot.points(noise.oadev.tau_s, noise.oadev.value, 2, color);
-    const Stroke dashed{color, 1.2, {5, 3}};
-    if (noise.fitted.size() == noise.oadev.tau_s.size()) {
-      plot.line(noise.oadev.tau_s, noise.fitted, dashed);
+    if (noise.oadev.lower.size() == noise.oadev.tau_s.size() &&
+        noise.oadev.upper.size() == noise.oadev.tau_s.size()) {
+      plot.band(noise.oadev.tau_s, noise.oadev.lower, drawable_upper(noise.oadev), color, 0.2);
     }
-    legend.push_back({series[i].label, {}, color});
+    plot.points(noise.oadev.tau_s, noise.oadev.value, 2, color);
+    const Stroke stroke{color, 1.4, kDashes[i % kDashes.size()]};
+    if (noise.fitted.size() == noise.oadev.tau_s.size()) {
+      plot.line(noise.oadev.tau_s, noise.fitted, stroke);
+    }
+    legend.push_back({series[i].label, stroke, {}});
   }
-  legend.push_back({"sum of the fitted terms", {palette::kBlack, 1.2, {5, 3}}, {}});
   draw_legend(canvas, {top_left.x + kMarginLeft, top_left.y + 18}, legend);
 }
 
@@ -81,7 +85,8 @@ std::string allan_svg(const std::vector<AllanSeries>& series, const std::string&
   constexpr double kWidth = 720, kHeight = 480;
   SvgCanvas canvas(kWidth, kHeight);
   canvas.rectangle({0, 0}, kWidth, kHeight, "#ffffff");
-  draw_allan(canvas, {0, 0}, kWidth, kHeight, series, unit);
+  draw_allan(canvas, {0, 0}, kWidth, kHeight, series,
+             {.deviation = "overlapping Allan deviation, " + unit});
   return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n" +
          canvas.svg("allan", "Overlapping Allan deviation against averaging time");
 }

@@ -178,7 +178,7 @@ void draw_legend(Canvas& canvas, Point at, const std::vector<LegendEntry>& entri
     if (entry.fill.empty()) {
       canvas.line({x, at.y - 4}, {x + 24, at.y - 4}, entry.stroke);
     } else {
-      canvas.rectangle({x, at.y - 9}, 24, 10, entry.fill, 0.6);
+      canvas.rectangle({x, at.y - 9}, 24, 10, entry.fill, entry.opacity);
     }
     canvas.text({x + 29, at.y}, entry.text, {kTickSize});
     const auto glyphs = std::count_if(entry.text.begin(), entry.text.end(),

@@ -55,8 +55,9 @@ class Plot {
 /// One entry of a legend.
 struct LegendEntry {
   std::string text;
-  Stroke stroke;     ///< drawn as a short line …
-  std::string fill;  ///< … or, when not empty, as a filled box
+  Stroke stroke;         ///< drawn as a short line …
+  std::string fill;      ///< … or, when not empty, as a filled box
+  double opacity = 0.6;  ///< of the box, as that of what it stands for
 };
 /// Entries in a row from `at` to the right.
 void draw_legend(Canvas& canvas, Point at, const std::vector<LegendEntry>& entries);

@@ -1,6 +1,5 @@
 #include "app/io/output_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -8,6 +7,8 @@
 #include <cstdlib>
 #include <system_error>
 #include <utility>
+
+#include "app/io/files.h"
 
 namespace plumbline::app {
 
@@ -18,25 +19,6 @@ namespace {
 tl::unexpected<Error> cannot_write(const fs::path& path, int error_number) {
   return fail(ErrorCode::output, fmt::format("{}: cannot write: {}", path.string(),
                                              std::generic_category().message(error_number)));
-}
-
-/// Writes and syncs; an errno value, 0 for success. The sync matters: a full disk may show only
-/// there.
-int write_file(const fs::path& path, std::string_view content) {
-  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) return errno;
-  int error = 0;
-  while (error == 0 && !content.empty()) {
-    const ssize_t written = ::write(file, content.data(), content.size());
-    if (written < 0) {
-      if (errno != EINTR) error = errno;
-    } else {
-      content.remove_prefix(static_cast<std::size_t>(written));
-    }
-  }
-  if (error == 0 && ::fsync(file) != 0) error = errno;
-  if (::close(file) != 0 && error == 0) error = errno;
-  return error;
 }
 
 }  // namespace
@@ -80,10 +62,15 @@ Result<OutputFolder> OutputFolder::prepare(const fs::path& folder) {
 }
 
 Result<void> OutputFolder::write(std::string_view name, std::string_view content) const {
-  if (const int error = write_file(staged(name), content); error != 0) {
-    return cannot_write(folder_ / name, error);
+  auto done = write_file_atomically(staged(name), content);
+  if (done) return done;
+  // A person knows the file by where it would have gone.
+  Error error = done.error();
+  const std::string place = staged(name).string();
+  if (error.message.starts_with(place)) {
+    error.message.replace(0, place.size(), (folder_ / name).string());
   }
-  return {};
+  return fail(std::move(error));
 }
 
 Result<void> OutputFolder::publish() {

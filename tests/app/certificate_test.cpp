@@ -9,6 +9,7 @@
 #include "app/certificate/rounding.h"
 #include "app/figure/plot.h"
 #include "app/figure/svg_canvas.h"
+#include "tests/app/certificate_example.h"
 
 namespace plumbline::app {
 namespace {
@@ -49,8 +50,14 @@ TEST(Rounding, WithoutUncertaintyNothingIsInvented) {
 TEST(Rounding, SignificantDigits) {
   EXPECT_EQ(significant(0.0279653, 3), "0.0280");
   EXPECT_EQ(significant(-12345.6, 3), "−12346");
-  EXPECT_EQ(significant(1.5e-9, 2), "1.5·10^-9");
+  EXPECT_EQ(significant(1.5e-9, 2), "1.5·10⁻⁹");
   EXPECT_EQ(significant(0, 3), "0");
+}
+
+TEST(Rounding, DifferencesEndWhereTheyStopToMatter) {
+  EXPECT_EQ(difference_beside(1.2e-14, 0.024), "0.00000");
+  EXPECT_EQ(difference_beside(-0.00063, 0.11), "−0.0006");
+  EXPECT_EQ(difference_beside(0.5, 0), "0.50");
 }
 
 // --- axes of figures ---
@@ -88,63 +95,8 @@ TEST(SvgCanvas, EscapesTextAndNumbersClips) {
 
 // --- the certificate ---
 
-// A unit with invented numbers: what is tested is that they are printed, not what they are.
-struct Example {
-  RunDescription description;
-  Calibration calibration;
-  Provenance provenance;
-  Evaluation verification;
-
-  Example() {
-    description.dut = {"A-<17>", "triad"};
-    description.gravity = {9.8101, 0.00002};
-    description.adc = Adc{16, -5, 0};
-    provenance.dut = description.dut;
-    provenance.created_utc = "2026-01-31T12:34:56Z";
-    provenance.input_sha256 = {{"samples.csv", "0123456789abcdef"}};
-    calibration.poses = 324;
-    calibration.samples = 12960;
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      AxisEstimate estimate;
-      estimate.value = {0.001, 0.002, 0.0003, -2.5};
-      estimate.value(static_cast<Eigen::Index>(i)) = 0.032002134;
-      estimate.covariance = Eigen::Vector4d(1e-12, 1e-12, 4e-12, 1e-12).asDiagonal();
-      calibration.estimates.batch_ls[i] = calibration.estimates.ekf[i] = estimate;
-      calibration.floor_pose_rms_mps2[i] = 0.028;
-      calibration.after.heldout_pose_rms_mps2[i] = 0.0291;
-      verification.after.pose_rms_mps2[i] = 0.0313;
-      verification.after.pose_max_abs_mps2[i] = 0.0777;
-      calibration.noise[i].source = "static record";
-      calibration.noise[i].adequate = true;
-      calibration.noise[i].oadev = {{1, 2, 4}, {9, 8, 7}, {3e-4, 2e-4, 1e-4}, {}, {}};
-    }
-    calibration.final = calibration.estimates;
-    verification.poses = 24;
-    for (int k = 0; k < 324; ++k) {
-      PoseResult pose;
-      pose.pose = {k, 10.0 * (k % 36), 10.0 * (k / 36), 0, 40};
-      pose.t_mean_s = 6.4 * k;
-      pose.temp_C = 20 + 0.01 * k;
-      for (std::size_t i = 0; i < kAxisCount; ++i) {
-        pose.residual_after_mps2[i] = 0.028 * std::sin(1.7 * k + static_cast<double>(i));
-      }
-      calibration.pose_results.push_back(pose);
-      calibration.convergence.ekf.push_back(calibration.estimates.ekf);
-      calibration.convergence.rls.push_back(calibration.estimates.ekf);
-      calibration.convergence.batch_ls.push_back(calibration.estimates.ekf);
-    }
-    calibration.diagnosis.verdict = Verdict::clean;
-    calibration.diagnosis.reason = "The residual is what the noise leaves.";
-  }
-
-  CertificateInput input() const {
-    return {description, calibration, provenance, &verification, {}};
-  }
-  std::string html() const { return write_html(make_certificate(input())); }
-};
-
 TEST(Certificate, SaysWhatWasMeasured) {
-  const std::string html = Example().html();
+  const std::string html = CertificateExample().html();
   EXPECT_THAT(html, HasSubstr("PL-A-&lt;17&gt;-20260131-01234567"));
   EXPECT_THAT(html, HasSubstr("<td>32.0021</td><td>0.0020</td>"));  // K_xx, U at k = 2
   EXPECT_THAT(html, HasSubstr("The residual is what the noise leaves."));
@@ -154,27 +106,29 @@ TEST(Certificate, SaysWhatWasMeasured) {
 }
 
 TEST(Certificate, PrintsWhatIsMissingAsMissing) {
-  const std::string html = Example().html();
+  const std::string html = CertificateExample().html();
   EXPECT_THAT(html, HasSubstr("<dt>Laboratory</dt><dd class=\"missing\">not stated</dd>"));
   EXPECT_THAT(html, HasSubstr("<dt>Authorised by</dt><dd class=\"missing\">not stated</dd>"));
 }
 
 TEST(Certificate, IsSelfContainedAndCarriesNoScript) {
-  const std::string html = Example().html();
+  const std::string html = CertificateExample().html();
   EXPECT_THAT(html, Not(HasSubstr("<script")));
   EXPECT_THAT(html, Not(HasSubstr("src=")));
   EXPECT_THAT(html, Not(HasSubstr("@import")));
   EXPECT_THAT(html, Not(HasSubstr("A-<17>")));
-  // Five figures: map, histogram, course, convergence, Allan curve.
+  // Six figures: map, histogram, course, convergence, budget, Allan curve.
   const std::regex svg("<svg ");
-  EXPECT_EQ(std::distance(std::sregex_iterator(html.begin(), html.end(), svg), {}), 5);
+  EXPECT_EQ(std::distance(std::sregex_iterator(html.begin(), html.end(), svg), {}), 6);
   EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
-TEST(Certificate, SameInputSameBytes) { EXPECT_EQ(Example().html(), Example().html()); }
+TEST(Certificate, SameInputSameBytes) {
+  EXPECT_EQ(CertificateExample().html(), CertificateExample().html());
+}
 
 TEST(Certificate, LimitsAndSuspicionChangeTheHeadline) {
-  Example example;
+  CertificateExample example;
   EXPECT_THAT(example.html(), HasSubstr("verdict plain\"><strong>Calibrated<"));
   example.calibration.diagnosis.verdict = Verdict::unexplained;
   EXPECT_THAT(example.html(),
@@ -184,7 +138,7 @@ TEST(Certificate, LimitsAndSuspicionChangeTheHeadline) {
 }
 
 TEST(Certificate, DrawsWithoutStaticRecordAndWithoutTemperature) {
-  Example example;
+  CertificateExample example;
   for (auto& noise : example.calibration.noise) noise.oadev = {};
   for (auto& pose : example.calibration.pose_results) pose.temp_C = std::nan("");
   const std::string html = example.html();

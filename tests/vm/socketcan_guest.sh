@@ -19,7 +19,7 @@ wait $simrig 2>/dev/null
 
 echo "plumbline run ended with $status"
 [ $status -eq 0 ] || exit 1
-for file in result.json certificate.html evaluation.json; do
+for file in result.json certificate.html certificate.pdf certificate.xml evaluation.json; do
   [ -s /tmp/out/$file ] || { echo "$file is missing"; exit 1; }
 done
 grep -q '"poses": 36' /tmp/out/result.json || { echo "result.json does not hold 36 poses"; exit 1; }

@@ -1,0 +1,39 @@
+// The chapters of a certificate; each appends its blocks. Used by make_certificate() only.
+#pragma once
+
+#include <memory>
+
+#include "app/certificate/certificate.h"
+
+namespace plumbline::app::content {
+
+inline constexpr double kCoverageFactor = 2;
+
+struct Composer {
+  Document& document;
+  const CertificateInput& input;
+  const Translator& tr;
+  std::shared_ptr<const Calibration> calibration;  ///< what figures keep
+
+  void add(Block block) const { document.blocks.push_back(std::move(block)); }
+};
+
+void add_identification(const Composer& composer);
+void add_method(const Composer& composer);
+void add_parameters(const Composer& composer);
+void add_budget(const Composer& composer);
+void add_estimators(const Composer& composer);
+void add_errors(const Composer& composer);
+void add_findings(const Composer& composer);
+void add_noise(const Composer& composer);
+void add_decision(const Composer& composer);
+void add_history(const Composer& composer);
+
+/// "K_xy"; column 3: "U_x0".
+std::string parameter_name(std::size_t axis, Eigen::Index column);
+/// mm/s² of m/s², three digits.
+std::string milli_mps2(double value_mps2);
+/// Capital letter, full stop; an effect's id at the beginning stays as it is written.
+std::string sentence(std::string text);
+
+}  // namespace plumbline::app::content

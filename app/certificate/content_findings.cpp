@@ -1,0 +1,210 @@
+// Errors before and after, what was found in the residual, noise, conformity.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/certificate/content.h"
+#include "app/certificate/effect_words.h"
+#include "app/certificate/figures.h"
+#include "app/certificate/rounding.h"
+#include "estimator/decision.h"
+
+namespace plumbline::app::content {
+namespace {
+
+bool enlarged(const Calibration& calibration) {
+  return !calibration.diagnosis.effects.empty() || !calibration.diagnosis.unlisted.empty();
+}
+
+double scale_mps2(const Calibration& calibration, std::size_t axis) {
+  return kStandardGravity_mps2 /
+         std::abs(calibration.final.batch_ls[axis].value(static_cast<Eigen::Index>(axis)));
+}
+
+/// "0.004" or "< 0.001": a p-value far below what it is compared with says no more.
+std::string p_value_text(double p) { return p < 1e-6 ? "< 10⁻⁶" : significant(p, 2); }
+
+void add_effect_table(const Composer& c) {
+  const Diagnosis& diagnosis = c.input.calibration.diagnosis;
+  Table table;
+  table.caption = c.tr("Effects found in the residual and added to the model");
+  table.header = {c.tr("effect"), c.tr("axes"), c.tr("parameters, U with k = 2"), c.tr("p-value"),
+                  c.tr("held-out excess removed")};
+  table.word_columns = {1, 2};
+  const auto share = [](double gain) {
+    return std::isfinite(gain) ? fmt::format("{:.0f} %", 100 * gain) : std::string("–");
+  };
+  const auto parameters_text = [](const std::vector<EffectParameter>& parameters) {
+    std::string text;
+    for (const EffectParameter& p : parameters)
+      text += (text.empty() ? "" : "; ") + parameter_text(p);
+    return text;
+  };
+  for (const FoundEffect& effect : diagnosis.effects) {
+    table.rows.push_back({fmt::format("{} ({})", effect_name(effect.id, c.tr), effect.id),
+                          axes_text(effect.axes), parameters_text(effect.parameters),
+                          p_value_text(effect.p_value), share(effect.heldout_gain)});
+  }
+  for (const UnlistedStructure& found : diagnosis.unlisted) {
+    const std::string parameters = parameters_text(found.parameters);
+    table.rows.push_back({unlisted_name(found, c.tr), axes_text(found.axes),
+                          found.shape + (parameters.empty() ? "" : ": " + parameters),
+                          p_value_text(found.p_value), share(found.heldout_gain)});
+  }
+  c.add(std::move(table));
+}
+
+void add_alternatives(const Composer& c) {
+  const Diagnosis& diagnosis = c.input.calibration.diagnosis;
+  Facts facts;
+  for (const FoundEffect& effect : diagnosis.effects) {
+    std::string others;
+    for (const std::string& other : effect.alternatives) {
+      others += (others.empty() ? "" : "; ") + effect_name(other, c.tr) + " (" + other + ")";
+    }
+    std::string text = others.empty() ? c.tr("nothing else explains the data as well")
+                                      : c.tr("these data do not tell it from: {}", others);
+    if (!effect.separate_by.empty()) {
+      text += ". " + c.tr("To tell them apart: {}", effect.separate_by);
+    }
+    facts.rows.push_back({effect_name(effect.id, c.tr), text});
+  }
+  if (facts.rows.empty()) return;
+  c.add(Paragraph{c.tr("What could not be told apart:")});
+  c.add(std::move(facts));
+}
+
+/// Names of what was searched for are in the catalogue of effects; their limits come with the
+/// diagnosis when it states them.
+void add_not_found(const Composer& c) {
+  if (c.input.not_found.empty()) return;
+  Table table;
+  table.caption = c.tr("Looked for and not found: an effect of this size would have been seen");
+  table.header = {c.tr("effect"), c.tr("axes"), c.tr("parameter"), c.tr("detection limit")};
+  table.word_columns = {1, 2};
+  for (const NotFound& item : c.input.not_found) {
+    const std::string unit = printed_unit(item.unit);
+    table.rows.push_back({effect_name(item.id, c.tr), axes_text(item.axes), item.parameter,
+                          significant(item.limit, 2) + (unit.empty() ? "" : " " + unit)});
+  }
+  c.add(std::move(table));
+}
+
+}  // namespace
+
+void add_errors(const Composer& c) {
+  const Calibration& calibration = c.input.calibration;
+  c.add(Heading{c.tr("Error before and after the added effects")});
+  Table table;
+  table.caption = c.tr("Input-referred errors, mm/s²");
+  const bool both = enlarged(calibration);
+  table.header = {c.tr("quantity")};
+  for (const char* axis : kAxisName) {
+    if (both) {
+      table.header.push_back(c.tr("{}, before", axis));
+      table.header.push_back(c.tr("{}, after", axis));
+    } else {
+      table.header.push_back(axis);
+    }
+  }
+  const auto row = [&](const std::string& label, const PerAxis<double>& before,
+                       const PerAxis<double>& after) {
+    std::vector<std::string> cells = {label};
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (both) cells.push_back(milli_mps2(before[i]));
+      cells.push_back(milli_mps2(after[i]));
+    }
+    table.rows.push_back(std::move(cells));
+  };
+  const ErrorFigures& b = calibration.before;
+  const ErrorFigures& a = calibration.after;
+  row(c.tr("RMS of the pose means, fitted poses"), b.fit_pose_rms_mps2, a.fit_pose_rms_mps2);
+  row(c.tr("RMS of the pose means, poses left out of the fit"), b.heldout_pose_rms_mps2,
+      a.heldout_pose_rms_mps2);
+  row(c.tr("largest pose mean, poses left out of the fit"), b.heldout_pose_max_abs_mps2,
+      a.heldout_pose_max_abs_mps2);
+  if (const Evaluation* v = c.input.verification; v != nullptr) {
+    row(c.tr("RMS of the pose means, fresh verification poses"), v->before.pose_rms_mps2,
+        v->after.pose_rms_mps2);
+    row(c.tr("largest pose mean, fresh verification poses"), v->before.pose_max_abs_mps2,
+        v->after.pose_max_abs_mps2);
+  }
+  row(c.tr("RMS of single readings"), b.sample_rms_mps2, a.sample_rms_mps2);
+  row(c.tr("expected RMS of the pose means from the noise alone"), calibration.floor_pose_rms_mps2,
+      calibration.floor_pose_rms_mps2);
+  row(c.tr("standard uncertainty of the expected RMS"), calibration.u_floor_pose_rms_mps2,
+      calibration.u_floor_pose_rms_mps2);
+  c.add(std::move(table));
+}
+
+void add_findings(const Composer& c) {
+  const Diagnosis& diagnosis = c.input.calibration.diagnosis;
+  c.add(Heading{c.tr("What the residual shows")});
+  c.add(Paragraph{c.tr("Verdict: {}. {} p {} for noise alone.", c.tr(to_string(diagnosis.verdict)),
+                       sentence(diagnosis.reason),
+                       (diagnosis.p_value < 1e-6 ? "" : "= ") + p_value_text(diagnosis.p_value)),
+                  diagnosis.verdict == Verdict::unexplained ? Tone::warning : Tone::plain});
+  if (enlarged(c.input.calibration)) {
+    add_effect_table(c);
+    add_alternatives(c);
+    c.add(evidence_figure({c.calibration, c.tr}));
+  }
+  add_not_found(c);
+}
+
+void add_noise(const Composer& c) {
+  const Calibration& calibration = c.input.calibration;
+  c.add(Heading{c.tr("Noise")});
+  Table table;
+  table.caption = c.tr(
+      "Identified noise, input-referred, with standard uncertainties; “<” gives the 95 % upper "
+      "limit of a term that is not present");
+  table.header = {c.tr("axis"), "Q, m/s",  "N, m/s/√s", "B, m/s²",
+                  "K, m/s²/√s", "R, m/s³", c.tr("fit"), c.tr("source")};
+  table.word_columns = {6, 7};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const NoiseModel& noise = calibration.noise[i];
+    const double scale = scale_mps2(calibration, i);
+    const bool known = noise.source != "none";
+    const auto term = [&](const NoiseTerm& t) {
+      if (!known) return std::string("–");
+      if (!t.present) {
+        return t.upper_limit > 0 ? "< " + significant(t.upper_limit * scale, 2) : std::string("–");
+      }
+      return fmt::format("{} ± {}", significant(t.value * scale, 3), significant(t.u * scale, 1));
+    };
+    table.rows.push_back({kAxisName[i], term(noise.Q), term(noise.N), term(noise.B), term(noise.K),
+                          term(noise.R),
+                          !known           ? "–"
+                          : noise.adequate ? c.tr("adequate")
+                                           : c.tr("not adequate"),
+                          noise.source.empty() ? "–" : c.tr(noise.source)});
+  }
+  c.add(std::move(table));
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (calibration.noise[i].remark.empty()) continue;
+    c.add(Paragraph{c.tr("Noise of the {} axis: {}.", kAxisName[i], calibration.noise[i].remark),
+                    Tone::note});
+  }
+  c.add(allan_figure({c.calibration, c.tr}));
+}
+
+void add_decision(const Composer& c) {
+  const Decision& decision = c.input.calibration.decision;
+  c.add(Heading{c.tr("Statement of conformity")});
+  if (decision.status == DecisionStatus::none) {
+    c.add(Paragraph{c.tr("No acceptance limit was given; no statement of conformity is made.")});
+    return;
+  }
+  Facts facts;
+  facts.rows = {{c.tr("Decision"), c.tr(to_words(decision.status))},
+                {c.tr("Limit"), c.tr("largest error {} mm/s²", milli_mps2(decision.limit_mps2))},
+                {c.tr("Measured value"),
+                 c.tr("largest error {} mm/s², standard uncertainty {} mm/s²",
+                      milli_mps2(decision.max_abs_error_mps2), milli_mps2(decision.u_mps2))},
+                {c.tr("Guard band"), fmt::format("{} mm/s²", milli_mps2(decision.guard_band_mps2))},
+                {c.tr("Decision rule"), decision.rule.empty() ? "" : c.tr(decision.rule)}};
+  c.add(std::move(facts));
+}
+
+}  // namespace plumbline::app::content

@@ -1,0 +1,188 @@
+// The calibrated parameters: sensitivity matrix, the terms of IEEE 1293, agreement, budget.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/certificate/budget.h"
+#include "app/certificate/content.h"
+#include "app/certificate/figures.h"
+#include "app/certificate/rounding.h"
+#include "app/certificate/sensor_terms.h"
+
+namespace plumbline::app::content {
+namespace {
+
+void add_matrix(const Composer& c) {
+  Table table;
+  table.caption = c.tr("Calibrated parameters (weighted least squares)");
+  table.header = {c.tr("axis i"), "K_ix, mV/g", "U",        "K_iy, mV/g", "U",
+                  "K_iz, mV/g",   "U",          "U_i0, mV", "U"};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    std::vector<std::string> row = {kAxisName[i]};
+    const AxisEstimate& estimate = c.input.calibration.final.batch_ls[i];
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      const RoundedResult rounded = round_result(
+          1e3 * estimate.value(j), 1e3 * kCoverageFactor * std::sqrt(estimate.covariance(j, j)));
+      row.push_back(rounded.value);
+      row.push_back(rounded.uncertainty);
+    }
+    table.rows.push_back(std::move(row));
+  }
+  c.add(std::move(table));
+}
+
+std::string with_uncertainty(const Quantity& quantity, double factor) {
+  const RoundedResult r =
+      round_result(factor * quantity.value, factor * kCoverageFactor * quantity.u);
+  return r.value + " ± " + r.uncertainty;
+}
+
+void add_ieee_terms(const Composer& c) {
+  const SensorTerms terms = sensor_terms(c.input.calibration.final.batch_ls);
+  Table table;
+  table.caption = c.tr("The same in the terms of IEEE Std 1293, U with k = 2");
+  table.header = {c.tr("axis"), c.tr("scale factor K1, mV/g"), c.tr("bias K0, mg"),
+                  c.tr("misalignment of the input axis, mrad"),
+                  c.tr("angle between input axes − 90°, mrad")};
+  table.word_columns = {3, 4};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisTerms& axis = terms.axis[i];
+    std::string tilt;
+    for (std::size_t j = 0; j < kAxisCount; ++j) {
+      if (j == i) continue;
+      tilt += fmt::format("{}{}: {}", tilt.empty() ? "" : "; ", kAxisName[j],
+                          with_uncertainty(axis.misalignment[j], 1e3));
+    }
+    const std::size_t a = (i + 1) % kAxisCount, b = (i + 2) % kAxisCount;
+    table.rows.push_back({kAxisName[i], with_uncertainty(axis.scale_V_per_g, 1e3),
+                          with_uncertainty(axis.bias_g, 1e3), tilt,
+                          fmt::format("{}–{}: {}", kAxisName[a], kAxisName[b],
+                                      with_uncertainty(terms.nonorthogonality_rad[i], 1e3))});
+  }
+  c.add(std::move(table));
+  c.add(Paragraph{
+      c.tr("Mounting convention: the rows of K stand in the frame of the unit as it was mounted on "
+           "the head: z along the spindle, x up at δ = h = 0, y completing a right-handed frame. A "
+           "rotation of the mounting changes the entries of K and the misalignments, but neither "
+           "K1 and K0 nor the angles between the input axes."),
+      Tone::note});
+}
+
+void add_agreement(const Composer& c) {
+  const Calibration& calibration = c.input.calibration;
+  Table table;
+  table.caption = c.tr("Twelve parameters alone, three ways of estimating");
+  table.header = {c.tr("parameter"), c.tr("least squares, mV/g (mV)"), c.tr("recursive − batch"),
+                  c.tr("filter − batch"), c.tr("U of batch")};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      const AxisEstimate& batch = calibration.estimates.batch_ls[i];
+      const double expanded = 1e3 * kCoverageFactor * std::sqrt(batch.covariance(j, j));
+      const RoundedResult rounded = round_result(1e3 * batch.value(j), expanded);
+      const auto difference = [&](const AxisEstimate& other) {
+        return difference_beside(1e3 * (other.value(j) - batch.value(j)), expanded);
+      };
+      table.rows.push_back(
+          {parameter_name(i, j), rounded.value,
+           calibration.estimates.rls ? difference((*calibration.estimates.rls)[i]) : "–",
+           difference(calibration.estimates.ekf[i]), rounded.uncertainty});
+    }
+  }
+  c.add(std::move(table));
+  const auto& en = calibration.estimates.agreement_en;
+  c.add(Paragraph{c.tr(
+      "Largest E_n number between filter and least squares: x {}, y {}, z {} (agreement up to 1).",
+      significant(en[0], 2), significant(en[1], 2), significant(en[2], 2))});
+}
+
+std::string source_name(const Composer& c, BudgetSource source) {
+  switch (source) {
+    case BudgetSource::readings:
+      return c.tr("scatter of the readings");
+    case BudgetSource::delta:
+      return c.tr("positioning in δ, each pose");
+    case BudgetSource::h:
+      return c.tr("positioning in h, each pose");
+    case BudgetSource::gravity:
+      break;
+  }
+  return c.tr("local gravity");
+}
+
+std::string degrees_of_freedom(double dof) {
+  return std::isfinite(dof) && dof < 1e5 ? fmt::format("{:.0f}", std::floor(dof)) : "∞";
+}
+
+void add_budget_rows(const Composer& c, const Budget& budget, Table& table) {
+  const std::string name = parameter_name(budget.axis, budget.column);
+  const bool offset = budget.column == 3;
+  const std::string unit = offset ? "mV" : "mV/g";
+  bool first = true;
+  for (const BudgetLine& line : budget.lines) {
+    // What cannot matter is left out: gravity acts on no offset.
+    if (offset && line.source == BudgetSource::gravity) continue;
+    const bool readings = line.source == BudgetSource::readings;
+    const bool gravity = line.source == BudgetSource::gravity;
+    const std::string input_unit = readings ? unit : gravity ? "m/s²" : "″";
+    const double scale = readings ? 1e3 : 1;
+    table.rows.push_back(
+        {first ? name : "", source_name(c, line.source),
+         readings  ? significant(scale * line.estimate, 6) + " " + unit
+         : gravity ? significant(line.estimate, 7) + " m/s²"
+                   : "0″",
+         c.tr("normal"),
+         significant(scale * line.u, 2) + (input_unit == "″" ? "" : " ") + input_unit,
+         degrees_of_freedom(line.dof), readings ? "1" : significant(1e3 * line.sensitivity, 2),
+         significant(1e3 * line.contribution, 2), fmt::format("{:.1f} %", 100 * line.share)});
+    first = false;
+  }
+  table.rows.push_back(
+      {"", c.tr("combined; U = {} {} with k = 2", significant(2e3 * budget.u, 2), unit),
+       significant(1e3 * budget.value, 6) + " " + unit, c.tr("normal"), "",
+       degrees_of_freedom(budget.dof_effective), "", significant(1e3 * budget.u, 2), "100.0 %"});
+}
+
+}  // namespace
+
+void add_parameters(const Composer& c) {
+  c.add(Heading{c.tr("Results")});
+  c.add(Paragraph{c.tr(
+      "Output voltage of axis i:  U_i = K_ix·a_x + K_iy·a_y + K_iz·a_z + U_i0, with the specific "
+      "force a in the frame of the triad in units of g_n = 9.80665 m/s². Expanded uncertainties "
+      "U with coverage factor k = 2 (about 95 %).")});
+  add_matrix(c);
+  add_ieee_terms(c);
+}
+
+void add_budget(const Composer& c) {
+  const Calibration& calibration = c.input.calibration;
+  c.add(Heading{c.tr("Uncertainty budget")});
+  const FigureContext context{c.calibration, c.tr};
+  c.add(budget_figure(context, c.input.description));
+  Table table;
+  table.caption = c.tr("Scale factors and offsets (GUM, JCGM 100:2008)");
+  table.header = {c.tr("parameter"), c.tr("quantity"), c.tr("estimate"), c.tr("distribution"),
+                  c.tr("u"),         c.tr("ν"),        c.tr("c"),        c.tr("c·u, mV/g (mV)"),
+                  c.tr("share")};
+  table.word_columns = {1, 3};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    for (const Eigen::Index column : {static_cast<Eigen::Index>(i), Eigen::Index{3}}) {
+      add_budget_rows(c, budget_of(calibration, c.input.description, i, column), table);
+    }
+  }
+  c.add(std::move(table));
+  c.add(Paragraph{
+      c.tr("The scatter of the readings contains the identified noise, the rounding by the "
+           "converter, the repeatability of the unit within the run, and what estimating the "
+           "added effects together with the parameters costs. A Monte Carlo propagation (JCGM "
+           "101) is not part of this certificate."),
+      Tone::note});
+}
+
+void add_estimators(const Composer& c) {
+  c.add(Heading{c.tr("Agreement of the estimators")});
+  add_agreement(c);
+  c.add(convergence_figure({c.calibration, c.tr}));
+}
+
+}  // namespace plumbline::app::content

@@ -1,0 +1,256 @@
+// Pictures of the fit: noise, convergence, budget, evidence.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "app/certificate/budget.h"
+#include "app/certificate/effect_words.h"
+#include "app/certificate/figures.h"
+#include "app/certificate/rounding.h"
+#include "app/figure/allan_figure.h"
+#include "app/figure/plot.h"
+
+namespace plumbline::app {
+namespace {
+
+constexpr double kWidth = 700;
+
+/// From dark to light, so that the parts of a bar stay apart without colour.
+constexpr std::array kPartColors = {"#08519c", "#d55e00", "#e8b35a", "#d9d9d9"};
+
+}  // namespace
+
+Figure allan_figure(const FigureContext& context) {
+  Figure figure;
+  figure.caption = context.tr(
+      "Overlapping Allan deviation of each output, input-referred (points, with 95 % limits), and "
+      "the sum of the identified noise terms (lines).");
+  figure.description = context.tr("Allan deviation against averaging time for the axes x, y and z");
+  figure.width = kWidth;
+  figure.height = 330;
+  figure.draw = [context](Canvas& canvas) {
+    const Calibration& calibration = *context.calibration;
+    PerAxis<NoiseModel> input_referred = calibration.noise;
+    std::vector<AllanSeries> series;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const double scale =
+          kStandardGravity_mps2 /
+          std::abs(calibration.final.batch_ls[i].value(static_cast<Eigen::Index>(i)));
+      DeviationCurve& curve = input_referred[i].oadev;
+      for (auto* values : {&curve.value, &curve.lower, &curve.upper, &input_referred[i].fitted}) {
+        for (double& value : *values) value *= scale;
+      }
+      if (curve.value.size() > 1) {
+        series.push_back({context.tr("{} axis", kAxisName[i]), &input_referred[i]});
+      }
+    }
+    if (series.empty()) {
+      canvas.text({kWidth / 2, 160},
+                  context.tr("no static record long enough for an Allan deviation"),
+                  {12, Anchor::middle});
+      return;
+    }
+    draw_allan(
+        canvas, {0, 0}, kWidth, 325, series,
+        {context.tr("averaging time τ, s"), context.tr("overlapping Allan deviation, {}", "m/s²")});
+  };
+  return figure;
+}
+
+Figure convergence_figure(const FigureContext& context) {
+  Figure figure;
+  figure.caption = context.tr(
+      "Estimate of each parameter against the number of positions, as difference from the final "
+      "least-squares value; the grey band is the final standard uncertainty times two.");
+  figure.description =
+      context.tr("Convergence of recursive least squares, filter and batch least squares");
+  figure.width = kWidth;
+  constexpr double kPanelWidth = 112, kPanelHeight = 92, kStepX = 164, kStepY = 136, kTop = 50;
+  figure.height = kTop + 3 * kStepY - 4;
+  figure.draw = [context](Canvas& canvas) {
+    const Calibration& calibration = *context.calibration;
+    const Convergence& run = calibration.convergence;
+    const std::size_t count = std::max({run.rls.size(), run.ekf.size(), run.batch_ls.size()});
+    if (count < 2) return;
+    draw_legend(canvas, {52, 18},
+                {{context.tr("recursive least squares"), {palette::kBlue, 1.5, {}}, ""},
+                 {context.tr("eight-state filter"), {palette::kOrange, 1.5, {6, 3}}, ""},
+                 {context.tr("batch least squares"), {palette::kBlack, 1.2, {1.5, 2}}, ""}});
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      for (Eigen::Index j = 0; j < 4; ++j) {
+        const AxisEstimate& final = calibration.estimates.batch_ls[i];
+        const double reference = final.value(j);
+        const double two_u = 2 * std::sqrt(final.covariance(j, j));
+        const auto curve = [&](const std::vector<TriadEstimate>& history) {
+          std::vector<double> values;
+          values.reserve(history.size());
+          for (const TriadEstimate& e : history)
+            values.push_back(1e3 * (e[i].value(j) - reference));
+          return values;
+        };
+        const auto rls = curve(run.rls), ekf = curve(run.ekf), batch = curve(run.batch_ls);
+        // The first positions would flatten everything that matters; the panel shows what follows.
+        double half = 4e3 * two_u / 2;
+        for (const auto* values : {&rls, &ekf}) {
+          for (std::size_t k = count / 4; k < values->size(); ++k) {
+            half = std::max(half, 1.2 * std::abs((*values)[k]));
+          }
+        }
+        if (!(half > 0)) half = 1;
+        PlotAxis x{i == 2 ? context.tr("positions") : "", 0, static_cast<double>(count)};
+        x.ticks = 3;
+        PlotAxis y{j == 0   ? context.tr("difference, mV/g")
+                   : j == 3 ? context.tr("difference, mV")
+                            : "",
+                   -half, half};
+        y.ticks = 4;
+        Plot plot(canvas,
+                  {62 + (j == 3 ? 24 : 0) + static_cast<double>(j) * kStepX,
+                   kTop + static_cast<double>(i) * kStepY},
+                  kPanelWidth, kPanelHeight, x, y);
+        plot.draw_frame(
+            j == 3 ? fmt::format("U_{}0", kAxisName[i])
+                   : fmt::format("K_{}{}", kAxisName[i], kAxisName[static_cast<std::size_t>(j)]));
+        plot.band({0, static_cast<double>(count)}, {-1e3 * two_u, -1e3 * two_u},
+                  {1e3 * two_u, 1e3 * two_u}, palette::kGrey, 0.25);
+        const auto positions = [](std::size_t n) {
+          std::vector<double> values(n);
+          for (std::size_t k = 0; k < n; ++k) values[k] = static_cast<double>(k + 1);
+          return values;
+        };
+        plot.line(positions(rls.size()), rls, {palette::kBlue, 1.4, {}});
+        plot.line(positions(ekf.size()), ekf, {palette::kOrange, 1.4, {6, 3}});
+        plot.line(positions(batch.size()), batch, {palette::kBlack, 1.1, {1.5, 2}});
+      }
+    }
+  };
+  return figure;
+}
+
+Figure budget_figure(const FigureContext& context, const RunDescription& description) {
+  constexpr double kLeft = 70, kBar = 16, kStep = 24, kTop = 46;
+  Figure figure;
+  figure.caption = context.tr(
+      "What the variance of each scale factor K_ii and offset U_i0 is made of, in shares; on the "
+      "right the expanded uncertainty.");
+  figure.description = context.tr("Bars of the uncertainty budget");
+  figure.width = kWidth;
+  figure.height = kTop + 6 * kStep + 34;
+  std::vector<Budget> budgets;
+  for (const bool offset : {false, true}) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      budgets.push_back(budget_of(*context.calibration, description, i,
+                                  offset ? 3 : static_cast<Eigen::Index>(i)));
+    }
+  }
+  figure.draw = [context, budgets](Canvas& canvas) {
+    const double width = kWidth - kLeft - 130;
+    const std::array<std::string, kPartColors.size()> names = {
+        context.tr("readings"), context.tr("angle δ"), context.tr("angle h"),
+        context.tr("local gravity")};
+    std::vector<LegendEntry> legend;
+    for (std::size_t k = 0; k < names.size(); ++k)
+      legend.push_back({names[k], {}, kPartColors[k], 1});
+    draw_legend(canvas, {kLeft, 22}, legend);
+    double y = kTop;
+    for (const Budget& budget : budgets) {
+      const bool offset = budget.column == 3;
+      canvas.text({kLeft - 8, y + 12},
+                  offset ? fmt::format("U_{}0", kAxisName[budget.axis])
+                         : fmt::format("K_{0}{0}", kAxisName[budget.axis]),
+                  {11, Anchor::end});
+      double x = kLeft;
+      for (std::size_t k = 0; k < budget.lines.size(); ++k) {
+        const double part = width * budget.lines[k].share;
+        if (part > 0.05) canvas.rectangle({x, y}, part, kBar, kPartColors[k]);
+        x += part;
+      }
+      canvas.polyline({{kLeft, y},
+                       {kLeft + width, y},
+                       {kLeft + width, y + kBar},
+                       {kLeft, y + kBar},
+                       {kLeft, y}},
+                      {palette::kBlack, 0.7, {}});
+      canvas.text({kLeft + width + 10, y + 12},
+                  fmt::format("U = {} {}", significant(2e3 * budget.u, 2), offset ? "mV" : "mV/g"),
+                  {11});
+      y += kStep;
+    }
+    for (int share = 0; share <= 100; share += 25) {
+      const double x = kLeft + width * share / 100;
+      canvas.line({x, y - 4}, {x, y}, {palette::kBlack, 0.7, {}});
+      canvas.text({x, y + 12}, fmt::format("{} %", share), {10, Anchor::middle});
+    }
+  };
+  return figure;
+}
+
+namespace {
+
+struct Evidence {
+  std::string name;
+  double gain = 0;
+  double p_value = 1;
+};
+
+/// At most `most` characters; a picture cannot wrap.
+std::string shortened(const std::string& text, std::size_t most) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    if ((text[at] & 0xC0) == 0x80) continue;
+    if (++count == most) return text.substr(0, at) + "…";
+  }
+  return text;
+}
+
+std::vector<Evidence> evidence_of(const Diagnosis& diagnosis, const Translator& tr) {
+  std::vector<Evidence> list;
+  for (const FoundEffect& e : diagnosis.effects) {
+    list.push_back({shortened(effect_name(e.id, tr) + " (" + axes_text(e.axes) + ")", 60),
+                    e.heldout_gain, e.p_value});
+  }
+  for (const UnlistedStructure& u : diagnosis.unlisted) {
+    list.push_back({shortened(unlisted_name(u, tr) + " (" + axes_text(u.axes) + ")", 60),
+                    u.heldout_gain, u.p_value});
+  }
+  return list;
+}
+
+}  // namespace
+
+Figure evidence_figure(const FigureContext& context) {
+  constexpr double kLeft = 20, kBar = 12, kStep = 40, kTop = 8, kBarWidth = 480;
+  const std::vector<Evidence> list = evidence_of(context.calibration->diagnosis, context.tr);
+  Figure figure;
+  figure.caption = context.tr(
+      "Evidence for the added effects: the share of the excess error on left-out poses that each "
+      "removes, and the probability of as much by noise alone.");
+  figure.description = context.tr("Bars of the evidence for each effect");
+  figure.width = kWidth;
+  figure.height = kTop + static_cast<double>(list.size()) * kStep + 22;
+  figure.draw = [context, list](Canvas& canvas) {
+    double y = kTop;
+    for (const Evidence& e : list) {
+      const double share = std::isfinite(e.gain) ? std::clamp(e.gain, 0.0, 1.0) : 0;
+      canvas.text({kLeft, y + 10}, e.name, {11});
+      canvas.rectangle({kLeft, y + 16}, kBarWidth, kBar, "#eeeeee");
+      canvas.rectangle({kLeft, y + 16}, kBarWidth * share, kBar, palette::kBlue);
+      canvas.text({kLeft + kBarWidth + 10, y + 26},
+                  fmt::format("{:.0f} %   p {}", 100 * share,
+                              e.p_value < 1e-6 ? "< 10⁻⁶" : "= " + significant(e.p_value, 2)),
+                  {11});
+      y += kStep;
+    }
+    for (int share = 0; share <= 100; share += 25) {
+      const double x = kLeft + kBarWidth * share / 100;
+      canvas.line({x, y - 10}, {x, y - 6}, {palette::kBlack, 0.7, {}});
+      canvas.text({x, y + 6}, fmt::format("{} %", share), {10, Anchor::middle});
+    }
+  };
+  return figure;
+}
+
+}  // namespace plumbline::app

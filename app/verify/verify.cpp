@@ -1,0 +1,216 @@
+#include "app/verify/verify.h"
+
+#include <fmt/format.h>
+#include <libxml/parser.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "app/certificate/dcc/dcc_units.h"
+#include "app/certificate/dcc/dcc_writer.h"
+#include "app/certificate/fingerprint.h"
+#include "app/certificate/pdf_file.h"
+#include "app/certificate/rounding.h"
+#include "app/io/json.h"
+#include "app/io/read_file.h"
+#include "app/io/sha256.h"
+#include "app/verify/dcc_reader.h"
+
+namespace plumbline::app {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string_view name_of(const xmlNode* node) { return reinterpret_cast<const char*>(node->name); }
+
+void collect_words(const xmlNode* node, std::vector<std::string>& words) {
+  for (; node != nullptr; node = node->next) {
+    if (node->type == XML_TEXT_NODE || node->type == XML_CDATA_SECTION_NODE) {
+      append_words(reinterpret_cast<const char*>(node->content), words);
+    } else if (node->type == XML_ELEMENT_NODE) {
+      const std::string_view name = name_of(node);
+      if (name == "head" || name == "svg" || name == "footer") continue;
+      collect_words(node->children, words);
+    }
+  }
+}
+
+/// What is being verified, as far as it is there.
+struct Files {
+  std::string xml;
+  std::string xml_name;
+  std::optional<std::string> html, result;
+  std::optional<OpenedPdf> pdf;
+  bool is_folder = false;
+};
+
+const Attachment* attached_xml(const OpenedPdf& pdf) {
+  const auto it = std::find_if(pdf.attachments.begin(), pdf.attachments.end(),
+                               [](const Attachment& a) { return a.name == "certificate.xml"; });
+  return it == pdf.attachments.end() ? nullptr : &*it;
+}
+
+Result<Files> read_pdf(const fs::path& path) {
+  const auto bytes = read_file(path);
+  if (!bytes) return fail(bytes.error());
+  auto pdf = open_pdf(*bytes, path.string());
+  if (!pdf) return fail(pdf.error());
+  const Attachment* xml = attached_xml(*pdf);
+  if (xml == nullptr) {
+    return fail(ErrorCode::input, path.string() + ": no certificate.xml is attached to it");
+  }
+  Files files;
+  files.xml = xml->content;
+  files.xml_name = path.string() + ", attached certificate.xml";
+  files.pdf = *std::move(pdf);
+  return files;
+}
+
+Result<Files> read_folder(const fs::path& folder) {
+  Files files;
+  files.is_folder = true;
+  files.xml_name = (folder / "certificate.xml").string();
+  const auto xml = read_file(folder / "certificate.xml");
+  if (!xml) return fail(xml.error());
+  files.xml = *xml;
+  for (const auto& [name, text] :
+       {std::pair("certificate.html", &files.html), std::pair("result.json", &files.result)}) {
+    auto content = read_file(folder / name);
+    if (!content) return fail(content.error());
+    *text = *std::move(content);
+  }
+  auto pdf = read_pdf(folder / "certificate.pdf");
+  if (!pdf) return fail(pdf.error());
+  files.pdf = std::move(pdf->pdf);
+  return files;
+}
+
+Result<Files> read_files(const fs::path& target) {
+  std::error_code ignored;
+  if (fs::is_directory(target, ignored)) return read_folder(target);
+  const auto bytes = read_file(target);
+  if (!bytes) return fail(bytes.error());
+  if (bytes->starts_with("%PDF-")) return read_pdf(target);
+  Files files;
+  files.xml = *bytes;
+  files.xml_name = target.string();
+  return files;
+}
+
+void compare_hash(VerifyReport& report, const std::string& what, const std::string& stated,
+                  const std::string& found) {
+  if (stated.empty()) {
+    report.bad(what + ": certificate.xml states no hash of it");
+    return;
+  }
+  report.expect(stated == found, what + ": the hash is that in certificate.xml",
+                "it is " + found + ", stated is " + stated);
+}
+
+void check_html(const Files& files, const ReadDcc& dcc, VerifyReport& report) {
+  compare_hash(report, "certificate.html", dcc.hash(dcc_ref::kHtml), sha256(*files.html));
+  const auto words = html_words(*files.html, "certificate.html");
+  if (!words) {
+    report.bad(words.error().message);
+    return;
+  }
+  compare_hash(report, "the text of certificate.html", dcc.hash(dcc_ref::kWords),
+               fingerprint(*words));
+  report.expect(!words->empty() && words->front() == dcc.id, "HTML and XML have the same number",
+                fmt::format("{} and {}", words->empty() ? "none" : words->front(), dcc.id));
+}
+
+/// The calibrated parameters of result.json in the order of the XML: three rows and the offsets.
+struct Parameters {
+  std::vector<double> values;
+  std::vector<double> u;
+};
+
+void compare_parameters(const Parameters& stated, const XmlList* list, const std::string& name,
+                        const std::vector<std::string>* words, VerifyReport& report) {
+  const std::string what = "XML and result.json agree in " + name;
+  if (list == nullptr) {
+    report.bad(what + ": the XML has no such list");
+    return;
+  }
+  std::vector<double> doubled = stated.u;
+  for (double& u : doubled) u *= 2;
+  report.expect(list->values == stated.values && list->expanded == doubled, what,
+                "the numbers differ");
+  if (words == nullptr) return;
+  for (std::size_t k = 0; k < list->values.size() && k < list->expanded.size(); ++k) {
+    const RoundedResult printed = round_result(1e3 * list->values[k], 1e3 * list->expanded[k]);
+    const bool found = std::find(words->begin(), words->end(), printed.value) != words->end();
+    if (!found) report.bad(fmt::format("HTML prints {} of {}: not found", printed.value, name));
+  }
+}
+
+void check_numbers(const Files& files, const ReadDcc& dcc, VerifyReport& report) {
+  std::optional<std::vector<std::string>> words;
+  if (const auto parsed = html_words(*files.html, "certificate.html")) words = *parsed;
+  try {
+    const Json json = Json::parse(*files.result);
+    const Json& fit = json.at("final").at("batch_ls");
+    Parameters offsets;
+    for (const char* axis : kAxisName) {
+      const Json& row = fit.at(axis);
+      compare_parameters({row.at("K_V_per_g").get<std::vector<double>>(),
+                          row.at("u_K_V_per_g").get<std::vector<double>>()},
+                         dcc.list(fmt::format("K_{}x", axis), dsi::kVoltPerG),
+                         fmt::format("K_{0}x, K_{0}y, K_{0}z", axis), words ? &*words : nullptr,
+                         report);
+      offsets.values.push_back(row.at("U0_V").get<double>());
+      offsets.u.push_back(row.at("u_U0_V").get<double>());
+    }
+    compare_parameters(offsets, dcc.list("U_x0", dsi::kVolt), "U_x0, U_y0, U_z0",
+                       words ? &*words : nullptr, report);
+  } catch (const std::exception& error) {
+    report.bad(fmt::format("result.json: not usable: {}", error.what()));
+  }
+}
+
+void check_siblings(const Files& files, const ReadDcc& dcc, VerifyReport& report) {
+  if (files.pdf) {
+    compare_hash(report, "the pages of certificate.pdf", dcc.hash(dcc_ref::kPdf),
+                 files.pdf->pages_sha256);
+  }
+  if (!files.is_folder) return;
+  report.expect(attached_xml(*files.pdf)->content == files.xml,
+                "the XML attached to certificate.pdf is certificate.xml", "they differ");
+  check_html(files, dcc, report);
+  compare_hash(report, "result.json", dcc.hash(dcc_ref::kResult), sha256(*files.result));
+  check_numbers(files, dcc, report);
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> html_words(std::string_view html, const std::string& name) {
+  const XmlDocPtr tree(xmlReadMemory(html.data(), static_cast<int>(html.size()), name.c_str(),
+                                     "UTF-8",
+                                     XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING));
+  if (!tree) return fail(ErrorCode::input, name + ": not well-formed");
+  std::vector<std::string> words;
+  collect_words(xmlDocGetRootElement(tree.get()), words);
+  return words;
+}
+
+Result<VerifyReport> verify_certificate(const fs::path& target,
+                                        const std::optional<fs::path>& schema) {
+  const auto files = read_files(target);
+  if (!files) return fail(files.error());
+  const auto dcc = read_dcc(files->xml, files->xml_name);
+  if (!dcc) return fail(dcc.error());
+  VerifyReport report;
+  if (schema) {
+    if (auto done = check_schema(*dcc, *schema, report); !done) return fail(done.error());
+  } else {
+    report.not_done("schema: not checked; name a folder with --schema or PLUMBLINE_DCC_SCHEMA");
+  }
+  check_rules(*dcc, report);
+  compare_hash(report, "certificate.xml", dcc->hash(dcc_ref::kSelf), dcc_self_hash(files->xml));
+  check_siblings(*files, *dcc, report);
+  return report;
+}
+
+}  // namespace plumbline::app

@@ -1,0 +1,195 @@
+// What a certificate says beside numbers that are only printed: derived terms, budget, languages.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "app/certificate/budget.h"
+#include "app/certificate/effect_words.h"
+#include "app/certificate/sensor_terms.h"
+#include "app/certificate/table_columns.h"
+#include "estimator/effects/catalogue.h"
+#include "tests/app/certificate_example.h"
+
+namespace plumbline::app {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+TriadEstimate triad(const Eigen::Matrix<double, 3, 4>& parameters, double sd) {
+  TriadEstimate estimate;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    AxisEstimate& axis = estimate[static_cast<std::size_t>(i)];
+    axis.value = parameters.row(i).transpose();
+    axis.covariance = sd * sd * Eigen::Matrix4d::Identity();
+  }
+  return estimate;
+}
+
+// --- IEEE 1293 ---
+
+TEST(SensorTerms, ByHand) {
+  Eigen::Matrix<double, 3, 4> K;
+  K << 3, 0, 4, 10,  // |K_x| = 5, leaning towards z by 4/3
+      0, 2, 0, 1,    //
+      0, 0, -8, 4;   // inverted axis
+  const SensorTerms terms = sensor_terms(triad(K, 0.01));
+  EXPECT_DOUBLE_EQ(terms.axis[0].scale_V_per_g.value, 5);
+  EXPECT_DOUBLE_EQ(terms.axis[0].scale_V_per_g.u, 0.01);  // along the input axis
+  EXPECT_DOUBLE_EQ(terms.axis[0].bias_g.value, 2);
+  // K0 = U/K1: u² = (0.01/5)² + (2·0.01/5)²
+  EXPECT_NEAR(terms.axis[0].bias_g.u, std::sqrt(4e-6 + 16e-6), 1e-12);
+  EXPECT_DOUBLE_EQ(terms.axis[0].misalignment[2].value, 4.0 / 3);
+  EXPECT_NEAR(terms.axis[0].misalignment[2].u, 0.01 * std::hypot(1.0 / 3, 4.0 / 9), 1e-12);
+  EXPECT_DOUBLE_EQ(terms.axis[2].scale_V_per_g.value, -8);
+  EXPECT_DOUBLE_EQ(terms.axis[2].bias_g.value, -0.5);
+  // z and x: directions (0 0 1) and (3 0 4)/5, an angle of acos 0.8, that is 90° − asin 0.8.
+  EXPECT_NEAR(terms.nonorthogonality_rad[1].value, -std::asin(0.8), 1e-12);
+  EXPECT_NEAR(terms.nonorthogonality_rad[2].value, 0, 1e-12);
+}
+
+TEST(SensorTerms, MountingRotationChangesNeitherScaleNorBiasNorAnglesBetweenAxes) {
+  Eigen::Matrix<double, 3, 4> K;
+  K << 3, 0.1, 0.2, 10, -0.3, 2, 0.1, 1, 0.2, 0.1, -8, 4;
+  const double c = std::cos(0.05), s = std::sin(0.05);
+  Eigen::Matrix3d turn;
+  turn << c, -s, 0, s, c, 0, 0, 0, 1;
+  Eigen::Matrix<double, 3, 4> turned = K;
+  turned.leftCols<3>() = K.leftCols<3>() * turn;
+  const SensorTerms before = sensor_terms(triad(K, 0.01)),
+                    after = sensor_terms(triad(turned, 0.01));
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    EXPECT_NEAR(before.axis[i].scale_V_per_g.value, after.axis[i].scale_V_per_g.value, 1e-12);
+    EXPECT_NEAR(before.axis[i].bias_g.value, after.axis[i].bias_g.value, 1e-12);
+    EXPECT_NEAR(before.nonorthogonality_rad[i].value, after.nonorthogonality_rad[i].value, 1e-12);
+    EXPECT_NEAR(before.nonorthogonality_rad[i].u, after.nonorthogonality_rad[i].u, 1e-12);
+  }
+  EXPECT_GT(std::abs(before.axis[0].misalignment[1].value - after.axis[0].misalignment[1].value),
+            0.04);
+}
+
+// --- budget ---
+
+TEST(Budget, PartsMakeUpTheCombinedUncertainty) {
+  CertificateExample example;
+  example.description.gravity.u_mps2 = 1e-4;
+  example.description.angles = {20, 30};
+  const Budget budget = budget_of(example.calibration, example.description, 0, 0);
+  double sum = 0, shares = 0;
+  for (const BudgetLine& line : budget.lines) {
+    sum += line.contribution * line.contribution;
+    shares += line.share;
+  }
+  EXPECT_NEAR(std::sqrt(sum), 1e-6, 1e-12);
+  EXPECT_NEAR(shares, 1, 1e-9);
+  const BudgetLine& gravity = budget.lines[3];
+  EXPECT_EQ(gravity.source, BudgetSource::gravity);
+  EXPECT_NEAR(gravity.contribution, 0.032002134 * 1e-4 / 9.8101, 1e-15);
+  EXPECT_GT(budget.dof_effective, 320);
+}
+
+TEST(Budget, PositioningByHand) {
+  // Four poses on the circle h = 0 and one pointing up: K_z hangs on the last pose and the mean of
+  // the others. With K = (0, 0, K_z) an error of δ changes nothing, an error of h by 1″ changes
+  // the output of the level poses by K_z·1″ each and that of the upright pose not at all.
+  CertificateExample example;
+  example.calibration.pose_results.resize(5);
+  for (int k = 0; k < 5; ++k) {
+    auto& pose = example.calibration.pose_results[static_cast<std::size_t>(k)].pose;
+    pose.delta_deg = k < 4 ? 90 * k : 0;
+    pose.h_deg = k < 4 ? 0 : 90;
+  }
+  example.calibration.final.batch_ls[2].value = {0, 0, 0.03, -2.5};
+  example.description.gravity = {kStandardGravity_mps2, 0};
+  example.description.angles = {1, 1};
+  const Budget budget = budget_of(example.calibration, example.description, 2, 2);
+  const double arcsec_rad = std::numbers::pi / 180 / 3600;
+  EXPECT_NEAR(budget.lines[1].sensitivity, 0, 1e-20);
+  // K_z = U_5 − mean(U_1 … U_4): the root of four squares of K_z·1″/4.
+  EXPECT_NEAR(budget.lines[2].sensitivity, 0.03 * arcsec_rad / 2, 1e-15);
+}
+
+// --- effects in words ---
+
+TEST(EffectWords, EveryEffectHasANameInBothLanguages) {
+  const Translator en(Language::en), uk(Language::uk);
+  for (const Effect* effect : effect_catalogue()) {
+    EXPECT_NE(effect_name(effect->id(), en), effect->id()) << effect->id();
+    EXPECT_NE(effect_name(effect->id(), uk), effect_name(effect->id(), en)) << effect->id();
+  }
+  EXPECT_EQ(effect_name("rig.h_scale+rig.backlash", en),
+            "scale error of the tilt axis + backlash of the spindle");
+  EXPECT_EQ(effect_name("covariate:rh_pct", en), "influence of the recorded column rh_pct");
+}
+
+TEST(EffectWords, ParametersAsTheyArePrinted) {
+  EXPECT_EQ(parameter_text({"k2", 0, 0.012345, 0.0002, "g/g^2"}),
+            "k2 (x) = (0.01235 ± 0.00040) g/g²");
+  EXPECT_EQ(parameter_text({"n", {}, 5, 0, ""}), "n = 5.00000");
+  EXPECT_EQ(parameter_text({"epsilon", {}, -0.1, 0.01, "deg"}), "epsilon = (−0.100 ± 0.020) °");
+}
+
+// --- what must be said ---
+
+TEST(Certificate, EffectsInWordsAndNumbersWithTheirRivals) {
+  CertificateExample example;
+  example.add_effects(1);
+  const std::string html = example.html();
+  EXPECT_THAT(html, HasSubstr("second-order nonlinearity (K2) (sensor.quadratic)"));
+  EXPECT_THAT(html, HasSubstr("k2 (x) = (0.00212 ± 0.00022) g/g²"));
+  EXPECT_THAT(html, HasSubstr("scale factor asymmetry (sensor.asymmetry)"));
+  EXPECT_THAT(html, HasSubstr("To tell them apart: poses with h below the horizon"));
+  EXPECT_THAT(html, HasSubstr("x, before"));
+  EXPECT_THAT(html, HasSubstr("<td>58.2</td><td>29.1</td>"));  // left-out poses, before and after
+}
+
+TEST(Certificate, WhatWasLookedForAndNotFound) {
+  CertificateExample example;
+  CertificateInput input = example.input();
+  input.not_found = {{"rig.backlash", {}, "w", 0.0123, "deg"}};
+  const std::string html = write_html(make_certificate(input));
+  EXPECT_THAT(html, HasSubstr("Looked for and not found"));
+  EXPECT_THAT(html, HasSubstr("<td class=\"words\">w</td><td>0.012 °</td>"));
+}
+
+TEST(Certificate, UkrainianLeavesNothingUntranslated) {
+  CertificateExample example;
+  example.add_effects(12);
+  example.language = Language::uk;
+  example.calibration.decision = {DecisionStatus::pass, 0.2, 0.1, 0.01, 0.02, ""};
+  UnlistedStructure unlisted;
+  unlisted.driver = "rh_pct";
+  unlisted.form = "scale";
+  example.calibration.diagnosis.unlisted = {unlisted};
+  const Translator tr(Language::uk);
+  const std::string html = write_html(make_certificate(example.input(), tr));
+  EXPECT_THAT(tr.missing(), testing::IsEmpty());
+  EXPECT_THAT(html, HasSubstr("<html lang=\"uk\">"));
+  EXPECT_THAT(html, HasSubstr("ВІДПОВІДАЄ"));
+  EXPECT_THAT(html, HasSubstr("нелінійність другого порядку"));
+  EXPECT_THAT(html, Not(HasSubstr("not stated")));
+}
+
+// --- tables ---
+
+TEST(TableColumns, ShareThePageAndNeverMore) {
+  const Table table{.caption = "",
+                    .header = {"a", "words", "n"},
+                    .rows = {{"x", "one two three four five six seven eight", "1.0"}}};
+  const auto monospaced = [](const std::string& text, bool) {
+    return 5.0 * static_cast<double>(text.size());
+  };
+  for (const double total : {500.0, 200.0, 100.0, 30.0}) {
+    const auto widths = column_widths(table, total, monospaced);
+    EXPECT_NEAR(widths[0] + widths[1] + widths[2], total, 1e-9);
+    for (const double width : widths) EXPECT_GT(width, 0);
+  }
+  // Where there is room for what cannot wrap, it does not.
+  const auto widths = column_widths(table, 200, monospaced);
+  EXPECT_GE(widths[2], 15);
+  EXPECT_GE(widths[1], 25);
+}
+
+}  // namespace
+}  // namespace plumbline::app
