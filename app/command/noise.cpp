@@ -47,17 +47,27 @@ Result<double> rate_of(const std::string& name, const std::vector<double>& t_s) 
 std::string summary_line(const NoiseChannel& channel) {
   std::string line = fmt::format("{} ({}):", channel.axis, channel.column);
   const NoiseModel& noise = channel.noise;
-  const std::pair<const char*, const NoiseTerm*> terms[] = {
-      {"Q", &noise.Q}, {"N", &noise.N}, {"B", &noise.B}, {"K", &noise.K}, {"R", &noise.R}};
-  for (const auto& [name, term] : terms) {
-    if (term->present) {
-      line +=
-          fmt::format(" {} = {} ± {}", name, significant(term->value, 3), significant(term->u, 2));
-    }
+  if (noise.source == "none")
+    return line + fmt::format(" the record cannot tell: {}\n", noise.remark);
+  const auto terms = reported_terms(noise);
+  for (std::size_t i = 0; i < kTermCount; ++i) {
+    if (!terms[i].present) continue;
+    line += fmt::format(" {} = {} ± {}", kTermName[i], significant(terms[i].value, 3),
+                        significant(terms[i].u, 2));
   }
-  if (noise.source == "none") return line + " the record cannot tell\n";
-  return line + fmt::format("; these terms {}\n",
-                            noise.adequate ? "describe the record" : "do NOT describe the record");
+  const RecordTerms& record = noise.record;
+  for (const MarkovTerm& term : record.markov) {
+    line += fmt::format(" Gauss-Markov {} over {} s", significant(term.sigma, 3),
+                        significant(term.tau_s, 2));
+  }
+  for (const SpectralLine& spectral : record.lines) {
+    line += fmt::format("; {} at {:.6g} Hz, amplitude {} ± {}", line_name(spectral), spectral.f_hz,
+                        significant(spectral.amplitude, 3), significant(spectral.u, 2));
+  }
+  line += record.adequate ? "; these terms describe the record"
+                          : "; these terms do NOT describe the record";
+  if (!record.remark.empty()) line += " (" + record.remark + ")";
+  return line + "\n";
 }
 
 Result<ExitCode> run_noise(const NoiseOptions& options) {
@@ -87,10 +97,13 @@ Result<ExitCode> run_noise(const NoiseOptions& options) {
     const AxisColumn& column = (*columns)[i];
     std::string unit = options.unit;
     if (unit.empty()) unit = options.scale == 1 ? unit_of_column(column.column) : "unit";
-    report.channels.push_back({.axis = column.axis,
-                               .column = column.column,
-                               .unit = unit,
-                               .noise = identify_noise(values, report.rate_hz)});
+    NoiseChannel channel{.axis = column.axis,
+                         .column = column.column,
+                         .unit = unit,
+                         .noise = identify_noise(values, report.rate_hz),
+                         .deviations = {}};
+    if (channel.noise.source != "none") channel.deviations = all_deviations(values, report.rate_hz);
+    report.channels.push_back(std::move(channel));
   }
   std::vector<AllanSeries> series;
   for (const NoiseChannel& channel : report.channels) {

@@ -40,11 +40,12 @@ Json json_noise_terms(const NoiseModel& noise, const std::string& unit) {
             {"present", value.present},
             {"upper_limit", json_number(value.upper_limit)}};
   };
-  return {{"Q", term(noise.Q, unit + "*s")},
-          {"N", term(noise.N, unit + "*sqrt(s)")},
-          {"B", term(noise.B, unit)},
-          {"K", term(noise.K, unit + "/sqrt(s)")},
-          {"R", term(noise.R, unit + "/s")}};
+  const auto shown = reported_terms(noise);
+  return {{"Q", term(shown[kTermQ], unit + "*s")},
+          {"N", term(shown[kTermN], unit + "*sqrt(s)")},
+          {"B", term(shown[kTermB], unit)},
+          {"K", term(shown[kTermK], unit + "/sqrt(s)")},
+          {"R", term(shown[kTermR], unit + "/s")}};
 }
 
 std::string file_text(const Json& json) { return json.dump(2) + "\n"; }

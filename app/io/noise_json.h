@@ -6,6 +6,7 @@
 
 #include "app/io/json.h"
 #include "app/provenance.h"
+#include "estimator/noise/allan.h"
 #include "estimator/noise/noise_model.h"
 
 namespace plumbline::app {
@@ -16,6 +17,7 @@ struct NoiseChannel {
   std::string column;  ///< of the file
   std::string unit;    ///< of the record after scaling
   NoiseModel noise;
+  DeviationSet deviations;  ///< empty curves when the record cannot tell
 };
 
 struct NoiseReport {
@@ -23,6 +25,9 @@ struct NoiseReport {
   std::size_t samples = 0;
   std::vector<NoiseChannel> channels;
 };
+
+/// "line", "line that wanders" or "harmonic 3 of 0.5642 Hz".
+std::string line_name(const SpectralLine& line);
 
 Json noise_json(const NoiseReport& report, const Provenance& provenance);
 

@@ -7,7 +7,9 @@
 #include <numeric>
 
 #include "estimator/noise/chi_squared.h"
+#include "estimator/noise/difference_sums.h"
 #include "estimator/noise/edf.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 
@@ -130,12 +132,20 @@ Variance hadamard_total_variance(const std::vector<double>& x, std::size_t m) {
   return result;
 }
 
+Variance overlapping_variance(const std::vector<double>& x, std::size_t m) {
+  Variance result;
+  if (x.size() <= 2 * m) return result;
+  result.sum = second_difference_sums(x, {m}).front();
+  result.count = x.size() - 2 * m;
+  return result;
+}
+
 Variance variance_of(Deviation kind, const std::vector<double>& phase, std::size_t m) {
   switch (kind) {
     case Deviation::adev:
       return difference_variance(phase, m, 2, m);
     case Deviation::oadev:
-      return difference_variance(phase, m, 2, 1);
+      return overlapping_variance(phase, m);
     case Deviation::mdev:
     case Deviation::tdev:
       return modified_variance(phase, m);
@@ -155,13 +165,28 @@ bool is_hadamard(Deviation kind) {
   return kind == Deviation::hdev || kind == Deviation::ohdev || kind == Deviation::htotdev;
 }
 
+DeviationPoint deviation_of(Deviation kind, const Variance& variance, double rate_hz,
+                            std::size_t m) {
+  DeviationPoint point;
+  if (variance.count == 0) return point;
+  const double tau = static_cast<double>(m) / rate_hz;
+  const double factor = (is_hadamard(kind) ? 1.0 / 6 : 1.0 / 2) * variance.scale;
+  point.value = std::sqrt(factor * variance.sum / static_cast<double>(variance.count)) / tau;
+  if (kind == Deviation::tdev) point.value *= tau / std::sqrt(3.0);
+  point.n = static_cast<long long>(variance.count);
+  return point;
+}
+
 std::size_t largest_factor(Deviation kind, std::size_t rates) {
   if (kind == Deviation::totdev) return rates / 2;
   if (kind == Deviation::htotdev) return rates / 3;
   return rates / 4;
 }
 
-std::vector<std::size_t> averaging_factors(TauSpacing spacing, std::size_t largest) {
+}  // namespace
+
+std::vector<std::size_t> averaging_factors(Deviation kind, std::size_t rates, TauSpacing spacing) {
+  const std::size_t largest = largest_factor(kind, rates);
   std::vector<std::size_t> factors;
   if (largest == 0) return factors;
   if (spacing == TauSpacing::all) {
@@ -179,8 +204,6 @@ std::vector<std::size_t> averaging_factors(TauSpacing spacing, std::size_t large
   }
   return factors;
 }
-
-}  // namespace
 
 std::vector<double> integrate_record(const std::vector<double>& record, double rate_hz) {
   assert(rate_hz > 0);
@@ -202,15 +225,31 @@ std::vector<double> integrate_record(const std::vector<double>& record, double r
 DeviationPoint deviation_at(Deviation kind, const std::vector<double>& phase, double rate_hz,
                             std::size_t m) {
   assert(rate_hz > 0 && m >= 1);
-  const Variance variance = variance_of(kind, phase, m);
-  DeviationPoint point;
-  if (variance.count == 0) return point;
-  const double tau = static_cast<double>(m) / rate_hz;
-  const double factor = (is_hadamard(kind) ? 1.0 / 6 : 1.0 / 2) * variance.scale;
-  point.value = std::sqrt(factor * variance.sum / static_cast<double>(variance.count)) / tau;
-  if (kind == Deviation::tdev) point.value *= tau / std::sqrt(3.0);
-  point.n = static_cast<long long>(variance.count);
-  return point;
+  return deviation_of(kind, variance_of(kind, phase, m), rate_hz, m);
+}
+
+std::vector<DeviationPoint> deviations_at(Deviation kind, const std::vector<double>& phase,
+                                          double rate_hz, const std::vector<std::size_t>& factors,
+                                          bool all_cores) {
+  std::vector<DeviationPoint> points(factors.size());
+  if (kind == Deviation::oadev) {
+    const std::vector<double> sums = second_difference_sums(phase, factors, all_cores);
+    for (std::size_t j = 0; j < factors.size(); ++j) {
+      Variance variance;
+      variance.sum = sums[j];
+      if (phase.size() > 2 * factors[j]) variance.count = phase.size() - 2 * factors[j];
+      points[j] = deviation_of(kind, variance, rate_hz, factors[j]);
+    }
+    return points;
+  }
+  const auto work = [&](std::size_t j) {
+    points[j] = deviation_at(kind, phase, rate_hz, factors[j]);
+  };
+  if (all_cores)
+    parallel_for(factors.size(), work);
+  else
+    for (std::size_t j = 0; j < factors.size(); ++j) work(j);
+  return points;
 }
 
 DeviationCurve deviation_curve(Deviation kind, const std::vector<double>& phase, double rate_hz,
@@ -218,17 +257,19 @@ DeviationCurve deviation_curve(Deviation kind, const std::vector<double>& phase,
   DeviationCurve curve;
   if (phase.size() < 3) return curve;
   const double tail = 0.5 * (1 - confidence);
+  const std::vector<std::size_t> factors = averaging_factors(kind, phase.size() - 1, spacing);
+  const std::vector<DeviationPoint> points = deviations_at(kind, phase, rate_hz, factors);
   int alpha = 0;
-  for (const std::size_t m : averaging_factors(spacing, largest_factor(kind, phase.size() - 1))) {
-    const DeviationPoint point = deviation_at(kind, phase, rate_hz, m);
-    if (point.n == 0) break;
+  for (std::size_t j = 0; j < factors.size() && points[j].n > 0; ++j) {
+    const std::size_t m = factors[j];
+    const double value = points[j].value;
     alpha = noise_exponent(phase, m, is_hadamard(kind) ? 3 : 2, alpha);
     const double edf = equivalent_degrees_of_freedom(kind, alpha, m, phase.size());
     curve.tau_s.push_back(static_cast<double>(m) / rate_hz);
-    curve.n.push_back(point.n);
-    curve.value.push_back(point.value);
-    curve.lower.push_back(point.value * std::sqrt(edf / chi_squared_quantile(1 - tail, edf)));
-    curve.upper.push_back(point.value * std::sqrt(edf / chi_squared_quantile(tail, edf)));
+    curve.n.push_back(points[j].n);
+    curve.value.push_back(value);
+    curve.lower.push_back(value * std::sqrt(edf / chi_squared_quantile(1 - tail, edf)));
+    curve.upper.push_back(value * std::sqrt(edf / chi_squared_quantile(tail, edf)));
   }
   return curve;
 }

@@ -34,6 +34,15 @@ struct DeviationPoint {
 DeviationPoint deviation_at(Deviation kind, const std::vector<double>& phase, double rate_hz,
                             std::size_t m);
 
+/// The same at several averaging factors; the overlapping Allan deviation in one pass over the
+/// phase (difference_sums.h).
+std::vector<DeviationPoint> deviations_at(Deviation kind, const std::vector<double>& phase,
+                                          double rate_hz, const std::vector<std::size_t>& factors,
+                                          bool all_cores = true);
+
+/// Averaging factors of a curve of `rates` rate samples, in increasing order.
+std::vector<std::size_t> averaging_factors(Deviation kind, std::size_t rates, TauSpacing spacing);
+
 /// A whole curve from phase data, in increasing τ, with limits that hold with probability
 /// `confidence` (two-sided, χ² with the edf of the noise type found at each τ). Stops where too few
 /// differences are left: the largest m is N/4 for the difference variances, N/2 for totdev, N/3

@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdio>
-#include <numbers>
+#include <limits>
 
 #include "estimator/noise/allan.h"
 #include "estimator/noise/chi_squared.h"
+#include "estimator/noise/line_search.h"
+#include "estimator/noise/record_terms.h"
 #include "estimator/noise/term_fit.h"
 
 namespace plumbline {
@@ -17,6 +18,7 @@ namespace plumbline {
 namespace {
 
 constexpr std::size_t kFewestSamples = 64;
+constexpr std::size_t kFewestChanges = 32;
 // A variance at the edge of its range: ½χ²₀ + ½χ²₁ (Self & Liang, 1987), here at 2.5 %.
 constexpr double kVarianceGain = 3.84;
 constexpr double kRampGain = 6.63;  // χ²₁ at 1 %: the slope's variance is itself an estimate
@@ -76,19 +78,6 @@ void fill_terms(const TermFit& fit, NoiseModel& model) {
   model.descriptions = fit.descriptions;
 }
 
-double fitted_deviation(const NoiseModel& model, double tau) {
-  const auto square = [](double v) { return v * v; };
-  double walk = tau / 3;
-  if (model.walk_decay_per_s > 0) {  // Gauss-Markov: IEEE Std 952, annex C
-    const double x = model.walk_decay_per_s * tau;
-    walk = (1 - (3 - 4 * std::exp(-x) + std::exp(-2 * x)) / (2 * x)) /
-           (square(model.walk_decay_per_s) * tau);
-  }
-  return std::sqrt(3 * square(model.Q.value / tau) + square(model.N.value) / tau +
-                   square(model.B.value) * 2 * std::numbers::ln2 / std::numbers::pi +
-                   square(model.K.value) * walk + 0.5 * square(model.R.value * tau));
-}
-
 }  // namespace
 
 NoisePowers noise_powers(const NoiseModel& model) {
@@ -97,6 +86,11 @@ NoisePowers noise_powers(const NoiseModel& model) {
       model.B.value * model.B.value, model.K.value * model.K.value,
       model.R.present ? model.R.value * model.R.value : 0.0;
   return power;
+}
+
+std::array<NoiseTerm, kTermCount> reported_terms(const NoiseModel& model) {
+  if (model.record.dof > 0) return model.record.term;
+  return {model.Q, model.N, model.B, model.K, model.R};
 }
 
 NoiseModel identify_noise(const std::vector<double>& record, double rate_hz) {
@@ -108,30 +102,36 @@ NoiseModel identify_noise(const std::vector<double>& record, double rate_hz) {
   if (record.size() < kFewestSamples)
     return undetermined(rate_hz, "too short: " + std::to_string(record.size()) + " samples, " +
                                      std::to_string(kFewestSamples) + " are needed");
-  const auto [low, high] = std::minmax_element(record.begin(), record.end());
-  if (*low == *high) return undetermined(rate_hz, "constant: no noise to be seen");
+  std::size_t changes = 0;
+  for (std::size_t i = 1; i < record.size(); ++i) changes += record[i] != record[i - 1] ? 1 : 0;
+  if (changes == 0) return undetermined(rate_hz, "constant: no noise to be seen");
+  if (changes < kFewestChanges)
+    return undetermined(rate_hz, "nearly constant: its value changes " + std::to_string(changes) +
+                                     " times, the noise is below its step");
 
-  const TermFit fit = fit_terms(record, rate_hz);
+  const LineSearch search = find_lines(record, rate_hz);
   NoiseModel model;
   model.rate_hz = rate_hz;
   model.source = "static record";
+  model.record = describe_record(search, record, rate_hz);
+  const bool rolls_off = model.record.band_hz < 0.49 * rate_hz;
+  const TermFit fit = fit_terms(
+      gather_spectrum(search.spectrum, rate_hz, search.masked,
+                      rolls_off ? model.record.band_hz : std::numeric_limits<double>::infinity()));
   fill_terms(fit, model);
   model.oadev = deviation_curve(Deviation::oadev, integrate_record(record, rate_hz), rate_hz);
-  for (const double tau : model.oadev.tau_s) model.fitted.push_back(fitted_deviation(model, tau));
+  for (const double tau : model.oadev.tau_s)
+    model.fitted.push_back(allan_deviation_of(model.record, tau));
   model.chi2 = fit.chi2;
   model.dof = fit.dof;
   model.p_value = chi_squared_tail(fit.chi2, fit.dof);
-  model.adequate = fit.converged && model.p_value > kInadequate && !fit.line;
-  if (fit.line) {
-    char text[128];
-    std::snprintf(text, sizeof text, "a periodic line at %.4g Hz, amplitude %.3g, is not noise",
-                  fit.line_hz, fit.line_amplitude);
-    model.remark = text;
-  } else if (!fit.converged) {
+  model.adequate =
+      fit.converged && model.p_value > kInadequate && search.lines.empty() && !rolls_off;
+  model.remark = model.record.remark;
+  if (model.remark.empty() && !fit.converged)
     model.remark = "the fit of the noise terms did not converge";
-  } else if (!model.adequate) {
+  if (model.remark.empty() && !model.adequate)
     model.remark = "the five terms do not describe the spectrum of this record";
-  }
   return model;
 }
 

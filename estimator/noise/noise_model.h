@@ -3,7 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,18 @@ struct NoiseTerm {
   double upper_limit = 0;  ///< 95 % upper limit, meaningful when absent
 };
 
+/// A sine in the record, or a narrow-band disturbance that wanders about one frequency.
+struct SpectralLine {
+  double f_hz = 0;
+  double u_f_hz = 0;
+  double amplitude = 0;  ///< of the sine, U; √(2·power) of what wanders
+  double u = 0;
+  double width_hz = 0;  ///< 0 for a sine; of what wanders, twice the standard deviation
+  double p_value = 1;   ///< chance that noise alone shows such a line anywhere in the spectrum
+  int harmonic = 1;     ///< order: the frequency is this multiple of fundamental_hz
+  double fundamental_hz = 0;  ///< of a harmonic of another line; otherwise 0
+};
+
 /// A deviation curve with confidence limits; all vectors have the same length.
 struct DeviationCurve {
   std::vector<double> tau_s;
@@ -34,6 +48,42 @@ struct DeviationCurve {
   std::vector<double> value;
   std::vector<double> lower;
   std::vector<double> upper;
+};
+
+/// First-order Gauss-Markov process: exponentially correlated noise.
+struct MarkovTerm {
+  double sigma = 0;  ///< standard deviation of the process, U
+  double u = 0;
+  double tau_s = 0;  ///< correlation time
+  double u_tau_s = 0;
+};
+
+/// What a static record says about itself: every term that describes its spectrum. The random walk
+/// K here never forgets; what forgets is a Gauss-Markov term.
+struct RecordTerms {
+  /// Q, N, B, K, R. Uncertainties hold the misfit where the terms do not describe the record, and
+  /// for B and K what depends on the choice of terms.
+  std::array<NoiseTerm, kTermCount> term;
+  std::vector<MarkovTerm> markov;   ///< shortest correlation time first
+  std::vector<SpectralLine> lines;  ///< strongest first
+  /// Of the five coefficients, order Q N B K R; zero rows for terms at zero.
+  NoisePowerMatrix correlation = NoisePowerMatrix::Zero();
+  /// The terms describe frequencies up to this one: the Nyquist frequency, or where the sensor's
+  /// own bandwidth ends.
+  double band_hz = 0;
+  /// Flicker is 1/f between these, flat below and 1/f² above, where the record shows it; 0 and
+  /// infinity: 1/f everywhere.
+  double flicker_low_hz = 0;
+  double flicker_high_hz = std::numeric_limits<double>::infinity();
+  /// Step between the values that occur in the record, U; 0 when there is none.
+  double step = 0;
+  double chi2 = 0;  ///< of the smoothed spectrum about the terms
+  double dof = 0;
+  double p_value = 1;
+  bool adequate = false;  ///< all of these terms together, lines too, describe the record
+  bool adequate_without_lines = false;  ///< the same terms, the lines left in
+  double p_value_without_lines = 1;
+  std::string remark;  ///< what a person should know; empty when there is nothing
 };
 
 /// Neighbouring coefficients of a record's cosine spectrum taken together (term_fit.h). A list of
@@ -76,6 +126,9 @@ struct NoiseModel {
   std::string source;     ///< "static record", "bursts at the poses" or "none"
   std::string remark;     ///< what a person should know: too short, constant, a periodic line …
 
+  /// All that the static record shows, for a report; without one, nothing.
+  RecordTerms record;
+
   /// Correlation of the five coefficients, order Q N B K R; zero rows for terms at zero.
   NoisePowerMatrix correlation = NoisePowerMatrix::Zero();
   std::vector<SpectrumBin> spectrum;  ///< what the record says about the powers
@@ -87,5 +140,9 @@ struct NoiseModel {
 /// [Q² N² B² K² R²] as identified. The ramp counts only when it is present: an unproven trend
 /// extrapolated to a longer run would swamp everything else.
 NoisePowers noise_powers(const NoiseModel& model);
+
+/// Q, N, B, K, R as a person should read them: of the record where there is one (its walk never
+/// forgets), otherwise as the engine uses them.
+std::array<NoiseTerm, kTermCount> reported_terms(const NoiseModel& model);
 
 }  // namespace plumbline

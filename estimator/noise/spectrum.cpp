@@ -1,6 +1,8 @@
 #include "estimator/noise/spectrum.h"
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -46,6 +48,19 @@ std::vector<double> cosine_transform(const std::vector<double>& record) {
   coefficient[0] =
       coefficient[0] / std::numbers::sqrt2 + reference * std::sqrt(static_cast<double>(n));
   return coefficient;
+}
+
+std::vector<std::complex<double>> fourier_transform(const std::vector<double>& record,
+                                                    std::size_t& length) {
+  assert(record.size() >= 4);
+  length = 4 * largest_smooth(record.size() / 4);
+  const std::vector<double> beginning(record.begin(),
+                                      record.begin() + static_cast<std::ptrdiff_t>(length));
+  std::vector<std::complex<double>> spectrum;
+  Eigen::FFT<double> fft;
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+  fft.fwd(spectrum, beginning);
+  return spectrum;
 }
 
 }  // namespace plumbline

@@ -1,6 +1,8 @@
 // Power of a record in the cosine basis, in which the noise terms are (nearly) uncorrelated.
 #pragma once
 
+#include <complex>
+#include <cstddef>
 #include <vector>
 
 namespace plumbline {
@@ -13,5 +15,11 @@ namespace plumbline {
 /// uncorrelated, without the leakage that the Fourier transform of a random walk suffers from, and
 /// a constant is confined to coefficient 0. Coefficient k sits at frequency k·rate/(2·length).
 std::vector<double> cosine_transform(const std::vector<double>& record);
+
+/// Σ x_i·exp(−2πi·k·i/length) for k = 0 … length/2 of the longest beginning of the record whose
+/// `length` is a multiple of 4 without a prime factor above 5. Records of at least 4 samples
+/// (precondition).
+std::vector<std::complex<double>> fourier_transform(const std::vector<double>& record,
+                                                    std::size_t& length);
 
 }  // namespace plumbline

@@ -1,15 +1,11 @@
 #include "estimator/noise/term_fit.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
-#include "estimator/noise/chi_squared.h"
 #include "estimator/noise/nonnegative.h"
-#include "estimator/noise/spectrum.h"
 
 namespace plumbline {
 
@@ -20,57 +16,22 @@ using Vector4 = Eigen::Vector4d;
 using Matrix4 = Eigen::Matrix4d;
 using Bin = SpectrumBin;
 
-/// Variance of flicker coefficient k relative to its density at that frequency: the ends of the
-/// record take a little away. Closed form with the sine integral, (2/π)(Si(πk) − (1−(−1)^k)/(πk)).
-double flicker_end_factor(std::size_t k) {
-  constexpr std::array<double, 4> kFirst = {0, 0.773669, 0.902823, 0.931095};
-  if (k < kFirst.size()) return kFirst[k];
-  const double x = std::numbers::pi * static_cast<double>(k);
-  const double sign = k % 2 == 0 ? 1 : -1;
-  return 1 - 2 / (std::numbers::pi * x) + sign * 4 / (std::numbers::pi * x * x * x);
-}
-
-Vector4 coefficient_variances(std::size_t k, std::size_t n, double rate_hz, double decay_per_s) {
-  const double angle = std::numbers::pi * static_cast<double>(k) / static_cast<double>(n);
-  const double s = 2 * std::sin(0.5 * angle);
-  const double c = 2 * std::cos(0.5 * angle);
-  // Quantization: interior increments, and the two ends that have no partner.
-  const double quantization = s * s + c * c / static_cast<double>(n);
-  // The walk keeps the part `kept` of itself from sample to sample.
-  const double kept = std::exp(-decay_per_s / rate_hz);
-  const double driving =
-      decay_per_s > 0 ? -std::expm1(-2 * decay_per_s / rate_hz) / (2 * decay_per_s) : 1 / rate_hz;
-  return {quantization * rate_hz * rate_hz, rate_hz, flicker_end_factor(k) / s,
-          driving / ((1 - kept) * (1 - kept) + kept * s * s)};
-}
-
-std::vector<Bin> make_bins(const std::vector<double>& c, double rate_hz, double decay_per_s) {
-  const std::size_t n = c.size();
-  const double nn = static_cast<double>(n);
+std::vector<Bin> make_bins(const SpectrumSums& sums, double decay_per_s) {
+  const std::size_t n = sums.length;
+  const double rate_hz = sums.rate_hz;
   std::vector<Bin> bins;
-  for (std::size_t k = 1; k < n;) {
-    const std::size_t width = std::min(std::max<std::size_t>(1, k / 32), n - k);
-    Bin bin;
-    for (std::size_t i = k; i < k + width; ++i) {
-      double m = 0;  // DCT-II of t = iT: closed form, zero for even coefficients
-      if (i % 2 == 1) {
-        const double half = 0.5 * std::numbers::pi * static_cast<double>(i) / nn;
-        m = -std::sqrt(2 / nn) * std::cos(half) / (2 * std::pow(std::sin(half), 2)) / rate_hz;
-      }
-      bin.square += c[i] * c[i];
-      bin.cross += c[i] * m;
-      bin.ramp += m * m;
-    }
-    bin.count = static_cast<double>(width);
-    // Simpson's rule over the bin is exact enough for densities that change by a few per cent.
-    const Vector4 first = coefficient_variances(k, n, rate_hz, decay_per_s);
-    const Vector4 last = coefficient_variances(k + width - 1, n, rate_hz, decay_per_s);
-    const Vector4 middle =
-        0.5 * (coefficient_variances(k + (width - 1) / 2, n, rate_hz, decay_per_s) +
-               coefficient_variances(k + width / 2, n, rate_hz, decay_per_s));
-    bin.density = (first + 4 * middle + last) / 6;
+  bins.reserve(sums.bins.size());
+  for (const SpectrumSum& sum : sums.bins) {
+    Bin bin{.count = sum.count, .square = sum.square, .cross = sum.cross, .ramp = sum.ramp};
+    bin.density = {
+        bin_mean(sum, [&](double k) { return quantization_variance(k, n, rate_hz); }), rate_hz,
+        bin_mean(sum,
+                 [&](double k) {
+                   return flicker_variance(k, n, rate_hz, 0,
+                                           std::numeric_limits<double>::infinity());
+                 }),
+        bin_mean(sum, [&](double k) { return walk_variance(k, n, rate_hz, decay_per_s); })};
     bins.push_back(bin);
-    k += width;
   }
   return bins;
 }
@@ -178,16 +139,17 @@ struct Description {
 };
 
 /// The unbounded walk first, then walks that forget faster and faster.
-std::vector<Description> describe(const std::vector<double>& c, double rate_hz) {
+std::vector<Description> describe(const SpectrumSums& sums) {
   constexpr unsigned kAll = (1U << kStochastic) - 1;
-  const double duration_s = static_cast<double>(c.size()) / rate_hz;
+  const double duration_s = sums.duration_s();
   std::vector<Description> descriptions(1);
   // Correlation times by octaves, from a quarter of the record down to ten samples.
-  const int octaves = static_cast<int>(std::floor(std::log2(0.025 * duration_s * rate_hz)));
+  const int octaves =
+      static_cast<int>(std::floor(std::log2(0.025 * static_cast<double>(sums.length))));
   for (int octave = 0; octave <= octaves; ++octave)
     descriptions.emplace_back().decay_per_s = std::ldexp(4 / duration_s, octave);
   for (Description& description : descriptions) {
-    description.bins = make_bins(c, rate_hz, description.decay_per_s);
+    description.bins = make_bins(sums, description.decay_per_s);
     description.best =
         maximise(description.bins, kAll, starting_powers(description.bins, kAll), Vector4::Zero());
   }
@@ -234,8 +196,8 @@ double upper_power(const std::vector<Bin>& bins, int term, const Maximum& best, 
   return high;
 }
 
-void judge_fit(const std::vector<double>& c, const std::vector<Bin>& bins, const Vector4& power,
-               const Slope& slope, double rate_hz, TermFit& fit) {
+void judge_fit(const std::vector<Bin>& bins, const Vector4& power, const Slope& slope,
+               TermFit& fit) {
   // Bins of at least 8 coefficients, so that each is nearly normal after the cube root.
   double count = 0;
   double ratio = 0;
@@ -254,32 +216,6 @@ void judge_fit(const std::vector<double>& c, const std::vector<Bin>& bins, const
   int parameters = 1;
   for (int i = 0; i < kStochastic; ++i) parameters += power(i) > 0 ? 1 : 0;
   fit.dof = std::max(1, used - parameters);
-
-  // A line puts its power into one or two neighbouring coefficients.
-  const std::size_t n = c.size();
-  double strongest = 0;
-  std::size_t where = 0;
-  std::size_t next = 1;  // first coefficient of the following bin
-  for (const Bin& bin : bins) {
-    const double variance = bin.density.dot(power);
-    const std::size_t end = next + static_cast<std::size_t>(bin.count);
-    if (next >= 16) {
-      for (std::size_t k = next; k < end; ++k) {
-        if (c[k] * c[k] > strongest * variance) {
-          strongest = c[k] * c[k] / variance;
-          where = k;
-        }
-      }
-    }
-    next = end;
-  }
-  const double single = normal_two_sided_tail(std::sqrt(strongest));
-  fit.line = single * static_cast<double>(n) < 1e-3;
-  fit.line_hz = static_cast<double>(where) * rate_hz / (2 * static_cast<double>(n));
-  double energy = 0;
-  for (std::size_t k = where > 3 ? where - 3 : 1; k <= where + 3 && k < n; ++k)
-    energy += c[k] * c[k];
-  fit.line_amplitude = std::sqrt(2 * energy / static_cast<double>(n));
 }
 
 }  // namespace
@@ -309,11 +245,10 @@ Likelihood spectrum_likelihood(const std::vector<SpectrumBin>& spectrum,
   return result;
 }
 
-TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
-  assert(record.size() >= 32 && rate_hz > 0);
-  const std::vector<double> c = cosine_transform(record);
+TermFit fit_terms(const SpectrumSums& sums) {
+  assert(sums.bins.size() >= 8);
   constexpr unsigned kAll = (1U << kStochastic) - 1;
-  const std::vector<Description> descriptions = describe(c, rate_hz);
+  const std::vector<Description> descriptions = describe(sums);
   const Description& chosen = descriptions[best_description(descriptions)];
   const std::vector<Bin>& bins = chosen.bins;
   const Maximum& best = chosen.best;
@@ -348,7 +283,7 @@ TermFit fit_terms(const std::vector<double>& record, double rate_hz) {
           std::max(0.0, maximise(bins, others, start, Vector4::Zero()).deviance - best.deviance);
     fit.upper_power(i) = upper_power(bins, i, best, 1 / std::sqrt(information(i, i)));
   }
-  judge_fit(c, bins, best.power, slope, rate_hz, fit);
+  judge_fit(bins, best.power, slope, fit);
   return fit;
 }
 

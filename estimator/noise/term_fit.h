@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimator/noise/noise_model.h"
+#include "estimator/noise/spectrum_sums.h"
 
 namespace plumbline {
 
@@ -29,15 +30,12 @@ struct TermFit {
   double walk_decay_per_s = 0;  ///< of K; not 0 where the record shows that its walk is bounded
   double chi2 = 0;              ///< of the smoothed spectrum about the fit, one value a bin
   double dof = 0;
-  bool line = false;          ///< a single frequency stands out
-  double line_hz = 0;         ///< the strongest one
-  double line_amplitude = 0;  ///< of the sine, U
   bool converged = false;
   std::vector<SpectrumBin> spectrum;
   std::vector<SpectrumDescription> descriptions;  ///< see NoiseModel
 };
 
-/// Fits a record of at least 32 samples (precondition). Spectral densities of the sampled terms,
+/// Fits a spectrum of at least 8 bins (precondition). Spectral densities of the sampled terms,
 /// two-sided, T = 1/rate, s = 2·sin(πfT):
 ///   Q: Q²s²/T,  N: N²,  B: B²T/s,  K: K²T²/s²,
 /// the densities of IEEE Std 952 with aliasing: differenced, fractionally and once summed white
@@ -45,6 +43,6 @@ struct TermFit {
 /// correlation time is searched on a grid: carried on beyond the record it would grow without
 /// bound. The ramp is a straight line, estimated by generalised least squares in the same fit;
 /// the degree of freedom it takes is accounted for (restricted likelihood).
-TermFit fit_terms(const std::vector<double>& record, double rate_hz);
+TermFit fit_terms(const SpectrumSums& sums);
 
 }  // namespace plumbline

@@ -158,12 +158,13 @@ TEST(EvaluationJson, FollowsItsSchemaAndJudgesTheWorstAxis) {
 
 TEST(NoiseJson, FollowsItsSchemaAndWritesAnInfiniteLimitAsNull) {
   NoiseReport report{.rate_hz = 100, .samples = 1000, .channels = {}};
-  NoiseChannel channel{.axis = "y", .column = "ay_lsb", .unit = "LSB", .noise = {}};
-  channel.noise.oadev = {.tau_s = {0.01, 0.02},
-                         .n = {998, 996},
-                         .value = {1, 0.7},
-                         .lower = {0.9, 0.6},
-                         .upper = {1.1, std::numeric_limits<double>::infinity()}};
+  NoiseChannel channel{
+      .axis = "y", .column = "ay_lsb", .unit = "LSB", .noise = {}, .deviations = {}};
+  channel.deviations.oadev = {.tau_s = {0.01, 0.02},
+                              .n = {998, 996},
+                              .value = {1, 0.7},
+                              .lower = {0.9, 0.6},
+                              .upper = {1.1, std::numeric_limits<double>::infinity()}};
   channel.noise.fitted = {1, 0.7};
   channel.noise.source = "static record";
   report.channels.push_back(channel);

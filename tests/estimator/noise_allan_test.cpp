@@ -1,13 +1,16 @@
 // Deviations against published values: NIST SP 1065 and the tables printed by Stable32.
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/noise/allan.h"
@@ -42,6 +45,21 @@ std::vector<double> read_column(const std::filesystem::path& path, std::size_t c
     for (; i <= column && words >> value; ++i) continue;
     if (i == column + 1) values.push_back(value);
   }
+  return values;
+}
+
+/// The first word of every line of a compressed file that begins with a number.
+std::vector<double> read_gzip_column(const std::filesystem::path& path) {
+  std::vector<double> values;
+  gzFile file = gzopen(path.c_str(), "rb");
+  if (file == nullptr) return values;
+  char line[256];
+  while (gzgets(file, line, sizeof line) != nullptr) {
+    char* end = nullptr;
+    const double value = std::strtod(line, &end);
+    if (end != line) values.push_back(value);
+  }
+  gzclose(file);
   return values;
 }
 
@@ -139,6 +157,61 @@ TEST(Allan, Stable32PhaseDat) {
     compare_table(phase,
                   kReference / "phasedat" / ("stable32_" + std::string(name) + "_octave.txt"),
                   kKinds.at(name), true, 1000000);
+}
+
+TEST(Allan, Stable32PhaseDatEveryFactor) {
+  REQUIRE_REFERENCE();
+  const std::vector<double> phase = read_column(kReference / "phasedat" / "PHASE.DAT", 0);
+  for (const char* name : {"adev", "oadev", "mdev", "hdev", "ohdev", "totdev"})
+    compare_table(phase, kReference / "phasedat" / ("stable32_" + std::string(name) + "_all.txt"),
+                  kKinds.at(name), false, 1000000);
+}
+
+TEST(Allan, Stable32PinkNoise) {
+  REQUIRE_REFERENCE();
+  const std::filesystem::path folder = kReference / "pink_frequency";
+  const std::vector<double> rate = read_column(folder / "pink_frequency.txt", 0);
+  ASSERT_EQ(rate.size(), 10000U);
+  const std::vector<double> phase = integrate_record(rate, 1);
+  compare_table(phase, folder / "stable32_oadev_octave.txt", Deviation::oadev, true, 1000000);
+  for (const char* name : {"adev", "oadev", "mdev", "hdev", "ohdev"})
+    compare_table(phase, folder / ("stable32_" + std::string(name) + "_all.txt"), kKinds.at(name),
+                  false, 1000000);
+}
+
+TEST(Allan, Stable32GpsReceiver) {
+  REQUIRE_REFERENCE();
+  const std::filesystem::path folder = kReference / "gps";
+  const std::vector<double> phase = read_gzip_column(folder / "gps_1pps_phase_data.txt.gz");
+  ASSERT_EQ(phase.size(), 241218U);
+  compare_table(phase, folder / "stable32_ADEV_decade.txt", Deviation::adev, true, 1000000);
+  const std::pair<const char*, Deviation> tables[] = {
+      {"OADEV", Deviation::oadev}, {"MDEV", Deviation::mdev},   {"TDEV", Deviation::tdev},
+      {"HDEV", Deviation::hdev},   {"OHDEV", Deviation::ohdev}, {"TOTDEV", Deviation::totdev}};
+  for (const auto& [name, kind] : tables)
+    compare_table(phase, folder / ("stable32_" + std::string(name) + "_octave.txt"), kind, true,
+                  1000000);
+}
+
+TEST(Allan, ManyFactorsInOnePassAreTheSameValues) {
+  std::vector<double> record;
+  for (int i = 0; i < 50001; ++i) record.push_back(std::sin(i * 0.37 * i) + 1e-4 * i);
+  const std::vector<double> phase = integrate_record(record, 100);
+  const std::vector<std::size_t> factors = {1, 2, 3, 5, 17, 4095, 8192, 12500, 25000, 25001};
+  const auto all = deviations_at(Deviation::oadev, phase, 100, factors, true);
+  const auto one = deviations_at(Deviation::oadev, phase, 100, factors, false);
+  for (std::size_t j = 0; j < factors.size(); ++j) {
+    const std::size_t m = factors[j];
+    double sum = 0;
+    for (std::size_t i = 0; i + 2 * m < phase.size(); ++i)
+      sum += std::pow(phase[i + 2 * m] - 2 * phase[i + m] + phase[i], 2);
+    const auto n = static_cast<double>(phase.size() > 2 * m ? phase.size() - 2 * m : 0);
+    const double tau = static_cast<double>(m) / 100;
+    EXPECT_EQ(all[j].n, static_cast<long long>(n));
+    EXPECT_NEAR(all[j].value, n > 0 ? std::sqrt(0.5 * sum / n) / tau : 0, 1e-12);
+    // The cores share the blocks, not the sums.
+    EXPECT_EQ(all[j].value, one[j].value);
+  }
 }
 
 TEST(Allan, Stable32MeasuredOscillator) {
