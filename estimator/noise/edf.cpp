@@ -170,7 +170,10 @@ double equivalent_degrees_of_freedom(Deviation kind, int alpha, std::size_t m,
       edf = greenhall_edf(alpha, 3, m, phase_points, kind == Deviation::ohdev, false);
       break;
     case Deviation::totdev:
-      edf = total_edf(alpha, span_over_tau);
+      // The table ends at white noise; in phase noise there is nothing to gain from the
+      // continuation, and the overlapping variance has nearly the same degrees of freedom.
+      edf = alpha > 0 ? greenhall_edf(alpha, 2, m, phase_points, true, false)
+                      : total_edf(alpha, span_over_tau);
       break;
     case Deviation::htotdev:
       edf = hadamard_total_edf(alpha, span_over_tau);

@@ -19,7 +19,8 @@ int noise_exponent(const std::vector<double>& phase, std::size_t m, int differen
 
 /// Equivalent degrees of freedom of a deviation at averaging factor m with `phase_points` data in
 /// noise f^alpha. Difference variances: Greenhall & Riley (2003); total deviations: SP 1065
-/// tables 7 and 9, with α outside their range taken at the nearest end. At least 1.
+/// tables 7 and 9; outside their range α is taken at the nearest end, but for the total deviation
+/// of phase noise (α > 0), which gets those of the overlapping Allan variance. At least 1.
 double equivalent_degrees_of_freedom(Deviation kind, int alpha, std::size_t m,
                                      std::size_t phase_points);
 
