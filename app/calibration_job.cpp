@@ -124,6 +124,7 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   job.provenance.dut = job.description.dut;
   job.started_utc = summary.header.started_utc;
   job.finished_utc = summary.finished_utc;
+  job.provenance.chain_head = summary.chain_head;
   job.run = std::move(stored->grid);
   job.static_record = std::move(stored->soak);
   job.verification = std::move(stored->verification);

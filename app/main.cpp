@@ -64,6 +64,9 @@ int run(int argc, char** argv) {
   add_plan(program, invocation);
   add_runs(program, invocation);
   add_export(program, invocation);
+  add_ctl(program, invocation);
+  add_jobs(program, invocation);
+  add_doctor(program, invocation);
   add_verify(program, invocation);
   add_help(program, invocation);
 

@@ -21,6 +21,7 @@ struct Provenance {
   std::vector<std::pair<std::string, std::string>> input_sha256;  ///< what was read, and its hash
   std::string created_utc;
   std::uint64_t seed = 1;
+  std::string chain_head{};  ///< of a stored run's hash chain; empty for files
 };
 
 }  // namespace plumbline::app

@@ -77,6 +77,7 @@ void Acquisition::store(SampleBatch& batch) {
   const std::size_t covariate_room = capacity_ - std::min(capacity_, queue_.covariates.size());
   append(queue_.covariates, batch.covariates, std::min(covariate_room, batch.covariates.size()));
   queue_.ended = queue_.ended || batch.ended;
+  queue_.empty_at = std::max(queue_.empty_at, batch.empty_at);
 }
 
 Result<SampleBatch> Acquisition::take(std::chrono::milliseconds timeout) {

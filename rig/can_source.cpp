@@ -30,6 +30,8 @@ Result<void> CanSource::open() {
   if (auto opened = carrier_->open(); !opened) return opened;
   silent_ = {};
   if (assembler_.last()) waited_ = Clock::now() - last_sample_at_;
+  // Whoever opens us again after that complaint accepts the node as it is now.
+  if (assembler_.counter_went_back()) assembler_.start_anew(expected_advance());
   return {};
 }
 
@@ -90,7 +92,10 @@ Result<SampleBatch> CanSource::read(std::chrono::milliseconds timeout) {
       if (!batch.samples.empty()) return batch;  // the next call meets the failure again
       return fail(frame.error());
     }
-    if (!*frame) break;
+    if (!*frame) {
+      batch.empty_at = before;
+      break;
+    }
     take(**frame, batch);
   }
   batch.ended = carrier_->ended();

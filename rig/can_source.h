@@ -11,7 +11,8 @@
 
 namespace plumbline::rig {
 
-/// open() may be called again after a failure: the sample clock goes on.
+/// open() may be called again after a failure: the sample clock goes on, by the time that has
+/// passed when the node has been switched off and on.
 class CanSource : public SampleSource {
  public:
   CanSource(std::unique_ptr<Carrier> carrier, FrameLayout layout, double rate_hz,

@@ -43,6 +43,9 @@ class DividingHead {
   virtual Result<void> connect() = 0;
   virtual Result<HeadStatus> status() = 0;
   virtual Result<SoftLimits> soft_limits() = 0;
+  /// What the drive says it is (serial number and so on), always the same text for the same drive;
+  /// empty when it does not say.
+  virtual Result<std::string> identity() = 0;
   /// Starts homing of both axes; status().homed says when it is done.
   virtual Result<void> start_homing() = 0;
   /// Starts a move of both axes; status().in_position says when this move has ended.

@@ -169,6 +169,18 @@ Result<SoftLimits> ModbusHead::soft_limits() {
   return SoftLimits{{limit[0], limit[2]}, {limit[1], limit[3]}};
 }
 
+Result<std::string> ModbusHead::identity() {
+  if (config_.identity_count == 0) return std::string();
+  const auto words = link_.read(config_.unit_id[0], config_.identity_address,
+                                config_.identity_count, call_deadline());
+  if (!words) return fail(at_axis(0, words.error()));
+  std::string text;
+  for (const std::uint16_t word : *words) {
+    text += fmt::format("{}{:04X}", text.empty() ? "" : "-", word);
+  }
+  return text;
+}
+
 Result<void> ModbusHead::start_homing() {
   const SteadyTime deadline = call_deadline();
   last_move_.reset();

@@ -22,6 +22,7 @@ class ModbusHead : public DividingHead {
   Result<void> connect() override;
   Result<HeadStatus> status() override;
   Result<SoftLimits> soft_limits() override;
+  Result<std::string> identity() override;
   Result<void> start_homing() override;
   Result<void> start_move(HeadAngles target) override;
   Result<void> stop() override;

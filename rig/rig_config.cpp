@@ -68,6 +68,11 @@ Result<HeadConfig> read_head_config(StrictTable& table) {
   config.poll_interval =
       read_ms(table, "poll_interval_ms", config.poll_interval, {.min = 1, .max = 1000});
   config.watchdog = read_ms(table, "watchdog_ms", config.watchdog, {.min = 0, .max = 65535});
+  config.identity_address =
+      static_cast<int>(table.integer_or("identity_address", 0, {.min = 0, .max = 65535}));
+  config.identity_count =
+      static_cast<int>(table.integer_or("identity_count", 0, {.min = 0, .max = 16}));
+  config.home_end_latched = table.flag_or("home_end_latched", config.home_end_latched);
   return config;
 }
 
@@ -107,6 +112,9 @@ Result<SensorConfig> read_sensor_config(StrictTable& table, const std::optional<
   for (const std::string& column : covariates.keys()) {
     config.covariates.push_back({column, covariates.text(column)});
   }
+  const std::string identity = table.text_or("identity", "");
+  config.tells_identity = !identity.empty();
+  if (config.tells_identity) config.covariates.push_back({kIdentityColumn, identity});
   return config;
 }
 

@@ -30,16 +30,22 @@ struct HeadConfig {
   std::chrono::milliseconds response_timeout{1000};
   std::chrono::milliseconds poll_interval{20};
   std::chrono::milliseconds watchdog{3000};  ///< 0 = off
+  /// Registers that tell one drive from another (serial number …), absolute; count 0: none.
+  int identity_address = 0;
+  int identity_count = 0;
+  /// HOME END stays set until homing is lost. False for drives that clear it at the next motion.
+  bool home_end_latched = true;
 };
 
 /// [sensor]: where the frames come from and what they mean.
 struct SensorConfig {
-  std::string can;       ///< "can:can0", "unix:PATH" or "log:FILE"
-  std::string dbc_file;  ///< empty: the layout that comes with the program
-  double rate_hz = 100;  ///< nominal sample rate of the node
-  Adc adc;               ///< span of the codes
-  SignalRoles signals;   ///< [sensor.signals]
-  std::vector<CovariateSignal> covariates;
+  std::string can;                          ///< "can:can0", "unix:PATH" or "log:FILE"
+  std::string dbc_file;                     ///< empty: the layout that comes with the program
+  double rate_hz = 100;                     ///< nominal sample rate of the node
+  Adc adc;                                  ///< span of the codes
+  SignalRoles signals;                      ///< [sensor.signals]
+  std::vector<CovariateSignal> covariates;  ///< kIdentityColumn among them when identity is given
+  bool tells_identity = false;              ///< [sensor] identity names a signal
   std::chrono::milliseconds silence_timeout{3000};
 };
 

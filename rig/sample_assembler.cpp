@@ -19,17 +19,24 @@ int distance(std::uint8_t from, std::uint8_t to) {
 }  // namespace
 
 std::optional<std::int64_t> CounterUnwrapper::accept(std::uint16_t counter, double expected) {
-  if (!last_) {
-    last_ = counter;
+  if (!last_ || advance_) {
+    last_ = last_ ? *last_ + *advance_ : counter;
+    advance_.reset();
+    last_raw_ = counter;
     return last_;
   }
   constexpr double kRound = 65536.0;
-  const auto step = static_cast<std::uint16_t>(counter - static_cast<std::uint16_t>(*last_));
+  const auto step = static_cast<std::uint16_t>(counter - last_raw_);
   const auto rounds = static_cast<std::int64_t>(std::lround((expected - step) / kRound));
   const std::int64_t advance = step + rounds * 65536;
   if (advance <= 0) return std::nullopt;
   last_ = *last_ + advance;
+  last_raw_ = counter;
   return last_;
+}
+
+void CounterUnwrapper::start_anew(std::int64_t advance) {
+  if (last_) advance_ = std::max<std::int64_t>(advance, 1);
 }
 
 SampleAssembler::SampleAssembler(FrameLayout layout, double rate_hz)
@@ -65,8 +72,8 @@ std::optional<RawSample> SampleAssembler::pair(const CanFrame& frame, bool is_se
       return std::abs(distance(counter_of(other, second), counter)) > kPairWindow;
     });
   }
-  if (last_) {
-    const int behind = distance(counter, static_cast<std::uint8_t>(last_->counter));
+  if (last_low_) {
+    const int behind = distance(counter, *last_low_);
     if (behind >= 0 && behind < kPairWindow) {  // half of a sample that is there or overtaken
       ++statistics_.out_of_order;
       ++refused_in_a_row_;
@@ -116,7 +123,18 @@ std::optional<RawSample> SampleAssembler::complete(const SampleBytes& bytes,
   sample.counter = *counter;
   sample.t_s = static_cast<double>(*counter - *first_counter_) / rate_hz_;
   last_ = sample;
+  last_low_ = static_cast<std::uint8_t>(decoded->counter);
   return sample;
+}
+
+void SampleAssembler::start_anew(double advance) {
+  unwrapper_.start_anew(std::llround(advance));
+  for (Waiting& waiting : waiting_) {
+    statistics_.unpaired += waiting.size();
+    waiting.clear();
+  }
+  last_low_.reset();
+  refused_in_a_row_ = 0;
 }
 
 }  // namespace plumbline::rig

@@ -17,9 +17,14 @@ class CounterUnwrapper {
   /// `expected` is how far the counter should have run since then, to within ±32767: it tells how
   /// often the counter has wrapped in a long silence. 0 is right for anything shorter.
   std::optional<std::int64_t> accept(std::uint16_t counter, double expected);
+  /// The node's counter has started anew, wherever: the next one accepted comes `advance` (at least
+  /// 1) after the last, so that what is unwrapped only ever grows.
+  void start_anew(std::int64_t advance);
 
  private:
   std::optional<std::int64_t> last_;
+  std::optional<std::int64_t> advance_;  ///< of the first one after a new start
+  std::uint16_t last_raw_ = 0;
 };
 
 /// One stream of frames of one node.
@@ -37,6 +42,9 @@ class SampleAssembler {
   /// True after so many samples in a row from the past that they cannot be latecomers: the node's
   /// counter has started anew.
   bool counter_went_back() const { return refused_in_a_row_ >= kMaxLatecomers; }
+  /// Takes the node's counter as it comes from now on; samples and times go on `advance` samples
+  /// after the last one.
+  void start_anew(double advance);
 
  private:
   static constexpr int kMaxLatecomers = 50;
@@ -52,6 +60,7 @@ class SampleAssembler {
   CounterUnwrapper unwrapper_;
   std::optional<std::int64_t> first_counter_;
   std::optional<RawSample> last_;
+  std::optional<std::uint8_t> last_low_;  ///< low byte of the last sample's counter, as sent
   int refused_in_a_row_ = 0;
   SourceStatistics statistics_;
 };

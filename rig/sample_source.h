@@ -18,6 +18,9 @@ struct CovariateReading {
   double value = 0;
 };
 
+/// Name under which the node's own number arrives among the covariates, when it sends one.
+inline constexpr const char* kIdentityColumn = "node identity";
+
 /// Losses and errors since open(); every counter only grows.
 struct SourceStatistics {
   std::uint64_t frames = 0;
@@ -33,10 +36,12 @@ struct SourceStatistics {
   std::uint64_t receive_buffer_bytes = 0;  ///< SO_RCVBUF as read back, 0 where there is none
 };
 
-/// What one call delivered. `ended` is true when a recorded log has been read to its end.
+/// What one call delivered. Everything that had been on its way at `empty_at` is in this or an
+/// earlier batch: nothing was waiting to be read at that time, or a moment later. `ended` is true when a recorded log has been read to its end.
 struct SampleBatch {
   std::vector<RawSample> samples;
   std::vector<CovariateReading> covariates;
+  std::chrono::steady_clock::time_point empty_at{};
   bool ended = false;
 };
 

@@ -62,6 +62,8 @@ class StrictTable {
   StrictTable table(std::string_view key);
   /// [[key]]: an array of tables; absent is empty.
   std::vector<StrictTable> tables(std::string_view key);
+  /// Accepts `key` as it is, whatever is in it: somebody else reads it.
+  void leave(std::string_view key) { find(key); }
   /// Keys of this table in file order, for tables whose keys are free (mark each with a getter).
   std::vector<std::string> keys() const;
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <map>
 
+#include "storage/hash_chain.h"
 #include "storage/sample_blob.h"
 
 namespace plumbline::storage {
@@ -19,9 +20,9 @@ constexpr double kCovariateReach_s = 60;
 
 constexpr const char* kSelectRuns = R"sql(
 SELECT run.id, serial, program_version, config_toml, plan_csv, started_utc, rate_hz,
-       adc_bits, adc_min_V, adc_max_V, state, finished_utc,
+       adc_bits, adc_min_V, adc_max_V, state, finished_utc, chain_head,
        count(pose.id), coalesce(sum(pose.sample_count), 0)
-FROM run LEFT JOIN pose ON pose.run = run.id
+FROM run LEFT JOIN pose ON pose.run = run.id AND pose.id NOT IN (SELECT pose FROM suspect)
 WHERE ?1 = 0 OR run.id = ?1
 GROUP BY run.id ORDER BY run.id)sql";
 
@@ -30,13 +31,6 @@ RunState state_from(const std::string& text) {
     if (text == to_string(state)) return state;
   }
   return RunState::failed;
-}
-
-PoseKind kind_from(const std::string& text) {
-  for (const PoseKind kind : {PoseKind::soak, PoseKind::grid}) {
-    if (text == to_string(kind)) return kind;
-  }
-  return PoseKind::verification;
 }
 
 RunSummary summary_from(const Statement& row) {
@@ -53,8 +47,9 @@ RunSummary summary_from(const Statement& row) {
   summary.header.adc.max_V = row.real(9);
   summary.state = state_from(row.text(10));
   summary.finished_utc = row.text(11);
-  summary.poses = row.integer(12);
-  summary.samples = row.integer(13);
+  summary.chain_head = to_hex(row.bytes(12));
+  summary.poses = row.integer(13);
+  summary.samples = row.integer(14);
   return summary;
 }
 
@@ -130,6 +125,21 @@ void add_covariates(SampleTable& table, const Readings& readings, const char* se
   }
 }
 
+using Covariates = std::map<long long, std::vector<StoredCovariate>>;  ///< by pose id
+
+Result<Covariates> read_covariates(const Database& database, RunId run) {
+  Covariates covariates;
+  auto done = database.each(
+      "SELECT pose, name, t_s, value FROM covariate JOIN pose ON pose.id = covariate.pose"
+      " WHERE pose.run = ?1 ORDER BY pose, position",
+      [&](const Statement& row) {
+        covariates[row.integer(0)].push_back({row.text(1), row.real(2), row.real(3)});
+      },
+      run);
+  if (!done) return fail(done.error());
+  return covariates;
+}
+
 Result<Readings> load_readings(const Database& database, RunId run) {
   Readings readings;
   auto done = database.each(
@@ -152,9 +162,9 @@ Result<void> load_poses(const Database& database, const Adc& adc, StoredRun& run
   long long disordered = -1;  // ordinal of the first pose whose clock went back
   auto done = database.each(
       "SELECT ordinal, kind, delta_deg, h_deg, delta_enc_deg, h_enc_deg, samples FROM pose"
-      " WHERE run = ?1 ORDER BY id",
+      " WHERE run = ?1 AND id NOT IN (SELECT pose FROM suspect) ORDER BY id",
       [&](const Statement& row) {
-        const Visit visit{kind_from(row.text(1)), row.real(2), row.real(3), row.real(4),
+        const Visit visit{pose_kind_from(row.text(1)), row.real(2), row.real(3), row.real(4),
                           row.real(5)};
         const std::vector<RawSample> samples = unpack_samples(row.bytes(6));
         for (const RawSample& sample : samples) {
@@ -195,12 +205,49 @@ Result<void> load_events(const Database& database, StoredRun& run) {
 
 }  // namespace
 
+PoseKind pose_kind_from(const std::string& text) {
+  for (const PoseKind kind : {PoseKind::soak, PoseKind::grid}) {
+    if (text == to_string(kind)) return kind;
+  }
+  return PoseKind::verification;
+}
+
 Result<std::vector<RunSummary>> list_runs(const Database& database) {
   std::vector<RunSummary> runs;
   auto done = database.each(
       kSelectRuns, [&](const Statement& row) { runs.push_back(summary_from(row)); }, 0);
   if (!done) return fail(done.error());
   return runs;
+}
+
+Result<void> each_pose(const Database& database, RunId run,
+                       const std::function<void(const StoredPose&)>& use) {
+  auto covariates = read_covariates(database, run);
+  if (!covariates) return fail(covariates.error());
+  return database.each(
+      "SELECT pose.id, ordinal, kind, delta_deg, h_deg, delta_enc_deg, h_enc_deg, settle_s,"
+      " settle_capped, approach, samples, coalesce(link.hash, x''),"
+      " pose.id IN (SELECT pose FROM suspect) FROM pose"
+      " LEFT JOIN link ON link.pose = pose.id WHERE pose.run = ?1 ORDER BY pose.id",
+      [&](const Statement& row) {
+        StoredPose pose;
+        pose.id = row.integer(0);
+        pose.record.ordinal = row.integer(1);
+        pose.record.kind = pose_kind_from(row.text(2));
+        pose.record.delta_deg = row.real(3);
+        pose.record.h_deg = row.real(4);
+        pose.record.delta_enc_deg = row.real(5);
+        pose.record.h_enc_deg = row.real(6);
+        pose.record.settle_s = row.real(7);
+        pose.record.settle_capped = row.integer(8) != 0;
+        pose.record.approach = static_cast<int>(row.integer(9));
+        pose.record.samples = unpack_samples(row.bytes(10));
+        pose.record.covariates = std::move((*covariates)[pose.id]);
+        pose.link = to_hex(row.bytes(11));
+        pose.suspect = row.integer(12) != 0;
+        use(pose);
+      },
+      run);
 }
 
 Result<StoredRun> load_run(const Database& database, RunId run) {

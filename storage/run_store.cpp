@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "storage/database.h"
+#include "storage/hash_chain.h"
 #include "storage/run_loader.h"
 #include "storage/sample_blob.h"
 #include "storage/schema.h"
@@ -95,16 +98,35 @@ Result<void> check_pose(const Database& database, RunId run, const PoseRecord& p
   return {};
 }
 
+/// The link for a pose that has just been inserted; part of its transaction.
+Result<void> extend_chain(const Database& database, RunId run, long long pose_id,
+                          const PoseRecord& pose) {
+  Hash head{};
+  auto done = database.each(
+      "SELECT chain_head FROM run WHERE id = ?1",
+      [&](const Statement& row) {
+        const Bytes stored = row.bytes(0);
+        std::copy_n(stored.begin(), std::min(stored.size(), head.size()), head.begin());
+      },
+      run);
+  if (!done) return done;
+  head = next_link(head, pose);
+  done = database.run("INSERT INTO link (pose, run, hash) VALUES (?1, ?2, ?3)", pose_id, run,
+                      Bytes(head));
+  if (!done) return done;
+  return database.run("UPDATE run SET chain_head = ?2 WHERE id = ?1", run, Bytes(head));
+}
+
 Result<void> insert_pose(const Database& database, RunId run, const PoseRecord& pose) {
   auto transaction = Transaction::begin(database, Transaction::Kind::writing);
   if (!transaction) return fail(transaction.error());
   if (auto fits = check_pose(database, run, pose); !fits) return fits;
   auto done = database.run(
       "INSERT INTO pose (run, ordinal, kind, delta_deg, h_deg, delta_enc_deg, h_enc_deg, settle_s,"
-      " settle_capped, first_t_s, last_t_s, sample_count, samples)"
-      " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+      " settle_capped, approach, first_t_s, last_t_s, sample_count, samples)"
+      " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)",
       run, pose.ordinal, to_string(pose.kind), pose.delta_deg, pose.h_deg, pose.delta_enc_deg,
-      pose.h_enc_deg, pose.settle_s, pose.settle_capped, pose.samples.front().t_s,
+      pose.h_enc_deg, pose.settle_s, pose.settle_capped, pose.approach, pose.samples.front().t_s,
       pose.samples.back().t_s, pose.samples.size(), Bytes(pack_samples(pose.samples)));
   if (!done) return done;
 
@@ -117,7 +139,37 @@ Result<void> insert_pose(const Database& database, RunId run, const PoseRecord& 
         insert->bind(pose_id, i, covariate.name, covariate.t_s, covariate.value).step();
     if (!end) return fail(end.error());
   }
+  if (done = extend_chain(database, run, pose_id, pose); !done) return done;
   return transaction->commit();
+}
+
+Result<std::vector<long long>> ordinals(const Database& database, RunId run, bool suspect) {
+  std::vector<long long> found;
+  const auto done = database.each(
+      "SELECT ordinal FROM pose WHERE run = ?1 AND (id IN (SELECT pose FROM suspect)) = ?2"
+      " ORDER BY ordinal",
+      [&](const Statement& row) { found.push_back(row.integer(0)); }, run, suspect);
+  if (!done) return fail(done.error());
+  return found;
+}
+
+Result<RunId> create(const Database& database, const RunHeader& header) {
+  auto transaction = Transaction::begin(database, Transaction::Kind::writing);
+  if (!transaction) return fail(transaction.error());
+  auto done = database.run(
+      "INSERT INTO run (serial, program_version, started_utc, rate_hz, adc_bits, adc_min_V,"
+      " adc_max_V, state, finished_utc, config_toml, plan_csv)"
+      " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, '', ?9, ?10)",
+      header.serial, header.program_version, header.started_utc, header.rate_hz, header.adc.bits,
+      header.adc.min_V, header.adc.max_V, to_string(RunState::running), header.config_toml,
+      header.plan_csv);
+  if (!done) return fail(done.error());
+  const RunId run = database.last_insert_id();
+  done = database.run("UPDATE run SET chain_head = ?2 WHERE id = ?1", run,
+                      Bytes(first_link(run, header)));
+  if (!done) return fail(done.error());
+  if (done = transaction->commit(); !done) return fail(done.error());
+  return run;
 }
 
 }  // namespace
@@ -144,15 +196,9 @@ Result<RunStore> RunStore::open_read_only(const fs::path& file) {
 }
 
 Result<RunId> RunStore::create_run(const RunHeader& header) {
-  const auto done = impl_->database->run(
-      "INSERT INTO run (serial, program_version, started_utc, rate_hz, adc_bits, adc_min_V,"
-      " adc_max_V, state, finished_utc, config_toml, plan_csv)"
-      " VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, '', ?9, ?10)",
-      header.serial, header.program_version, header.started_utc, header.rate_hz, header.adc.bits,
-      header.adc.min_V, header.adc.max_V, to_string(RunState::running), header.config_toml,
-      header.plan_csv);
+  const auto done = create(*impl_->database, header);
   if (!done) return while_doing(done.error(), "while creating a run");
-  return impl_->database->last_insert_id();
+  return *done;
 }
 
 Result<void> RunStore::commit_pose(RunId run, const PoseRecord& pose) {
@@ -173,6 +219,37 @@ Result<void> RunStore::add_event(RunId run, const EventRecord& event) {
   return {};
 }
 
+Result<void> RunStore::suspect_pose(RunId run, long long ordinal, const std::string& why) {
+  const auto done = impl_->database->run(
+      "INSERT INTO suspect (pose, why) SELECT id, ?3 FROM pose WHERE run = ?1 AND ordinal = ?2",
+      run, ordinal, why);
+  if (!done) {
+    return while_doing(done.error(),
+                       fmt::format("while taking pose {} out of run {}", ordinal, run));
+  }
+  return {};
+}
+
+Result<void> RunStore::set_identity(RunId run, const RigIdentity& identity) {
+  const auto done =
+      impl_->database->run("INSERT INTO identity (run, drive, node) VALUES (?1, ?2, ?3)", run,
+                           identity.drive, identity.node);
+  if (!done) return while_doing(done.error(), fmt::format("while storing the rig of run {}", run));
+  return {};
+}
+
+Result<std::optional<RigIdentity>> RunStore::identity(RunId run) const {
+  std::optional<RigIdentity> identity;
+  const auto done = impl_->database->each(
+      "SELECT drive, node FROM identity WHERE run = ?1",
+      [&](const Statement& row) {
+        identity = RigIdentity{row.text(0), row.text(1)};
+      },
+      run);
+  if (!done) return fail(done.error());
+  return identity;
+}
+
 Result<void> RunStore::finish_run(RunId run, RunState state, const std::string& finished_utc) {
   bool found = false;
   const auto done = impl_->database->each(
@@ -187,13 +264,25 @@ Result<std::vector<RunSummary>> RunStore::runs() const { return list_runs(*impl_
 
 Result<StoredRun> RunStore::load(RunId run) const { return load_run(*impl_->database, run); }
 
-Result<std::vector<long long>> RunStore::committed_poses(RunId run) const {
-  std::vector<long long> ordinals;
-  const auto done = impl_->database->each(
-      "SELECT ordinal FROM pose WHERE run = ?1 ORDER BY ordinal",
-      [&](const Statement& row) { ordinals.push_back(row.integer(0)); }, run);
+Result<ChainReport> RunStore::check_chain(RunId run) const {
+  return storage::check_chain(*impl_->database, run);
+}
+
+Result<std::vector<PoseRecord>> RunStore::poses(RunId run) const {
+  std::vector<PoseRecord> records;
+  const auto done = each_pose(*impl_->database, run, [&](const StoredPose& pose) {
+    if (!pose.suspect) records.push_back(pose.record);
+  });
   if (!done) return fail(done.error());
-  return ordinals;
+  return records;
+}
+
+Result<std::vector<long long>> RunStore::committed_poses(RunId run) const {
+  return ordinals(*impl_->database, run, false);
+}
+
+Result<std::vector<long long>> RunStore::suspect_poses(RunId run) const {
+  return ordinals(*impl_->database, run, true);
 }
 
 }  // namespace plumbline::storage

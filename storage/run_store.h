@@ -34,6 +34,7 @@ struct RunSummary {
   RunHeader header;
   RunState state = RunState::running;
   std::string finished_utc;
+  std::string chain_head;  ///< last link of the hash chain (hash_chain.h), hexadecimal
   long long poses = 0;
   long long samples = 0;
 };
@@ -55,8 +56,15 @@ struct PoseRecord {
   double h_enc_deg = 0;
   double settle_s = 0;         ///< from in-position to the first accepted sample
   bool settle_capped = false;  ///< the hard cap ended the settling
+  int approach = 0;            ///< direction of the last δ motion: −1, +1; 0 = none so far
   std::vector<RawSample> samples;
   std::vector<StoredCovariate> covariates;
+};
+
+/// Whose rig a run was measured with; empty texts: not stated by the drive or the node.
+struct RigIdentity {
+  std::string drive;
+  std::string node;
 };
 
 struct EventRecord {
@@ -64,6 +72,14 @@ struct EventRecord {
   std::string utc;
   std::string kind;  ///< state, fault, retry, settle_cap, loss …
   std::string text;
+};
+
+/// What a look at the hash chain of one run says; no faults: nothing was changed.
+struct ChainReport {
+  RunId run = 0;
+  long long poses = 0;
+  std::string head;  ///< as stored, hexadecimal
+  std::vector<std::string> faults;
 };
 
 /// A run as it is handed to the engine: volts, times and the columns of a measurement file.
@@ -102,12 +118,25 @@ class RunStore {
   /// (storage) when its ordinal is stored already.
   Result<void> commit_pose(RunId run, const PoseRecord& pose);
   Result<void> add_event(RunId run, const EventRecord& event);
+  /// Takes a committed pose out of the run: it stays stored, but is neither loaded nor counted. Its
+  /// step may be measured again under another ordinal.
+  Result<void> suspect_pose(RunId run, long long ordinal, const std::string& why);
+  /// Once per run.
+  Result<void> set_identity(RunId run, const RigIdentity& identity);
+  /// Empty when it has not been set.
+  Result<std::optional<RigIdentity>> identity(RunId run) const;
   /// Sets the state; RunState::running with an empty time reopens a run that is resumed.
   Result<void> finish_run(RunId run, RunState state, const std::string& finished_utc);
 
   Result<std::vector<RunSummary>> runs() const;
   Result<StoredRun> load(RunId run) const;
-  /// Ordinals of the committed poses, ascending.
+  /// The poses as they were committed, in the order of the visits; suspect ones left out.
+  Result<std::vector<PoseRecord>> poses(RunId run) const;
+  /// Ordinals of the suspect ones, ascending.
+  Result<std::vector<long long>> suspect_poses(RunId run) const;
+  /// Looks for changed, removed and inserted poses.
+  Result<ChainReport> check_chain(RunId run) const;
+  /// Ordinals of the committed poses that are not suspect, ascending.
   Result<std::vector<long long>> committed_poses(RunId run) const;
 
  private:

@@ -5,6 +5,8 @@
 #include <array>
 #include <cassert>
 
+#include "storage/hash_chain.h"
+
 namespace plumbline::storage {
 
 namespace {
@@ -84,6 +86,44 @@ CREATE TRIGGER event_is_fixed BEFORE UPDATE ON event
   BEGIN SELECT RAISE(ABORT, 'events are never changed'); END;
 )sql";
 
+// Version 2. The hash chain, the direction in which δ was approached, and whose drive and node a
+// run was measured with, and poses that turned out to be measured at a wrong angle: they stay, but
+// are not loaded, and their step is measured again.
+constexpr const char* kVersion2 = R"sql(
+ALTER TABLE run ADD COLUMN chain_head BLOB NOT NULL DEFAULT x'';   -- hash_chain.h
+ALTER TABLE pose ADD COLUMN approach INTEGER NOT NULL DEFAULT 0 CHECK (approach IN (-1, 0, 1));
+
+CREATE TABLE link (
+  pose INTEGER PRIMARY KEY REFERENCES pose (id),
+  run  INTEGER NOT NULL REFERENCES run (id),
+  hash BLOB NOT NULL CHECK (length(hash) = 32)
+) STRICT;
+CREATE INDEX link_run ON link (run);
+CREATE TRIGGER link_is_kept BEFORE DELETE ON link
+  BEGIN SELECT RAISE(ABORT, 'the hash chain is never deleted'); END;
+CREATE TRIGGER link_is_fixed BEFORE UPDATE ON link
+  BEGIN SELECT RAISE(ABORT, 'the hash chain is never changed'); END;
+
+CREATE TABLE suspect (
+  pose INTEGER PRIMARY KEY REFERENCES pose (id),
+  why  TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER suspect_is_kept BEFORE DELETE ON suspect
+  BEGIN SELECT RAISE(ABORT, 'a suspicion is never deleted'); END;
+CREATE TRIGGER suspect_is_fixed BEFORE UPDATE ON suspect
+  BEGIN SELECT RAISE(ABORT, 'a suspicion is never changed'); END;
+
+CREATE TABLE identity (
+  run   INTEGER PRIMARY KEY REFERENCES run (id),
+  drive TEXT NOT NULL,                                -- '' when the drive does not say
+  node  TEXT NOT NULL
+) STRICT;
+CREATE TRIGGER identity_is_kept BEFORE DELETE ON identity
+  BEGIN SELECT RAISE(ABORT, 'the identity of the rig is never deleted'); END;
+CREATE TRIGGER identity_is_fixed BEFORE UPDATE ON identity
+  BEGIN SELECT RAISE(ABORT, 'the identity of the rig is never changed'); END;
+)sql";
+
 struct Identity {
   long long application_id = 0;
   long long version = 0;
@@ -122,7 +162,8 @@ Result<void> check_ours(const Database& database, const Identity& identity, int 
 }  // namespace
 
 std::span<const Migration> migrations() {
-  static const std::array<Migration, 1> all{{{1, kVersion1}}};
+  static const std::array<Migration, 2> all{
+      {{.to = 1, .script = kVersion1}, {.to = 2, .script = kVersion2, .fill = &link_older_runs}}};
   return all;
 }
 
@@ -144,7 +185,9 @@ Result<void> migrate(const Database& database, std::span<const Migration> steps)
   if (!identity) return fail(identity.error());
   for (const Migration& step : steps) {
     if (step.to <= identity->version) continue;
-    if (auto done = database.execute(step.script); !done) {
+    auto done = database.execute(step.script);
+    if (done && step.fill != nullptr) done = step.fill(database);
+    if (!done) {
       return fail(done.error().code,
                   fmt::format("{} (while migrating to schema {})", done.error().message, step.to));
     }

@@ -18,6 +18,7 @@ inline constexpr int kApplicationId = 0x504C4D42;
 struct Migration {
   int to = 0;
   std::string script;
+  Result<void> (*fill)(const Database&) = nullptr;  ///< runs after the script: what SQL cannot do
 };
 
 /// All migrations, ascending and without a gap; the last one's `to` is the current version.

@@ -27,6 +27,9 @@ void add_dry_run(CLI::App& program, Invocation& invocation);
 void add_plan(CLI::App& program, Invocation& invocation);
 void add_runs(CLI::App& program, Invocation& invocation);
 void add_export(CLI::App& program, Invocation& invocation);
+void add_ctl(CLI::App& program, Invocation& invocation);
+void add_jobs(CLI::App& program, Invocation& invocation);
+void add_doctor(CLI::App& program, Invocation& invocation);
 void add_verify(CLI::App& program, Invocation& invocation);
 void add_help(CLI::App& program, Invocation& invocation);
 

@@ -68,12 +68,14 @@ Result<ExitCode> dry_run(const DryRunArguments& arguments) {
   fmt::print(stderr, "dry-run: simulated rig on {} and {}, {} times real time\n",
              simulated->modbus(), simulated->can(), arguments.speed);
   const std::string hint = fmt::format("plumbline dry-run --out {} (a new run)", arguments.out);
-  return measure_and_calibrate(
-      {.session = {.rig = *rig, .database = fs::path(arguments.out) / "run.db", .resume = false},
-       .out = arguments.out,
-       .seed = arguments.seed,
-       .style = *style,
-       .resume_hint = hint});
+  return measure_and_calibrate({.session = {.rig = *rig,
+                                            .database = fs::path(arguments.out) / "run.db",
+                                            .out = arguments.out,
+                                            .resume = false},
+                                .out = arguments.out,
+                                .seed = arguments.seed,
+                                .style = *style,
+                                .resume_hint = hint});
 }
 
 }  // namespace

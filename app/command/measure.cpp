@@ -4,11 +4,18 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstdio>
-#include <optional>
+#include <limits>
 
 #include "app/calibration_job.h"
+#include "app/provenance.h"
+#include "app/sequencer/control_socket.h"
+#include "app/sequencer/live_state.h"
 #include "app/sequencer/progress.h"
+#include "rig/acquisition.h"
 
 namespace plumbline::app {
 
@@ -17,35 +24,140 @@ namespace {
 /// Signal handlers reach nothing but this.
 EngineControl control;
 
-void on_signal(int /*number*/) { control.request_stop(); }
+/// The second one is in a hurry.
+void on_end(int /*number*/) {
+  if (control.stop_requested()) {
+    control.request_abort();
+  } else {
+    control.request_stop();
+  }
+}
 
-/// SIGINT and SIGTERM ask the engine to stop, as long as this lives.
-class StopOnSignal {
+/// Ctrl-Z: the program goes on, the motors do not; once more, and they do again.
+void on_pause(int /*number*/) {
+  if (control.pause_requested() == EngineControl::Pause::none) {
+    control.request_pause(EngineControl::Pause::now);
+  } else {
+    control.request_resume();
+  }
+}
+
+void on_pause_at_pose(int /*number*/) { control.request_pause(EngineControl::Pause::at_pose); }
+void on_resume(int /*number*/) { control.request_resume(); }
+
+/// Signals give orders to the engine, as long as this lives.
+class OrdersBySignal {
  public:
-  StopOnSignal() {
-    struct sigaction action {};
-    action.sa_handler = on_signal;
-    sigemptyset(&action.sa_mask);
-    sigaction(SIGINT, &action, &interrupt_);
-    sigaction(SIGTERM, &action, &terminate_);
+  OrdersBySignal() {
+    for (std::size_t i = 0; i < kOrders.size(); ++i) {
+      struct sigaction action {};
+      action.sa_handler = kOrders[i].handler;
+      sigemptyset(&action.sa_mask);
+      sigaction(kOrders[i].number, &action, &before_[i]);
+    }
   }
-  ~StopOnSignal() {
-    sigaction(SIGINT, &interrupt_, nullptr);
-    sigaction(SIGTERM, &terminate_, nullptr);
+  ~OrdersBySignal() {
+    for (std::size_t i = 0; i < kOrders.size(); ++i) {
+      sigaction(kOrders[i].number, &before_[i], nullptr);
+    }
   }
-  StopOnSignal(const StopOnSignal&) = delete;
-  StopOnSignal& operator=(const StopOnSignal&) = delete;
+  OrdersBySignal(const OrdersBySignal&) = delete;
+  OrdersBySignal& operator=(const OrdersBySignal&) = delete;
 
  private:
-  struct sigaction interrupt_ {};
-  struct sigaction terminate_ {};
+  struct Order {
+    int number;
+    void (*handler)(int);
+  };
+  static constexpr std::array kOrders = {
+      Order{SIGINT, on_end},    Order{SIGTERM, on_end},           Order{SIGHUP, on_end},
+      Order{SIGTSTP, on_pause}, Order{SIGUSR1, on_pause_at_pose}, Order{SIGUSR2, on_resume}};
+  std::array<struct sigaction, kOrders.size()> before_{};
 };
 
-Result<storage::RunId> measure(const MeasureRequest& request) {
-  const StopOnSignal stop_on_signal;
+Result<ExitCode> calibrate_run(const MeasureRequest& request, storage::RunId run,
+                               std::string& sentence) {
+  auto job = job_from_database(request.session.database, run, request.seed);
+  if (!job) return fail(job.error());
+  job->style = request.style;
+  const auto outcome = perform(*job, request.out);
+  if (!outcome) return fail(outcome.error());
+  fmt::print("run {} in {}\n{}\n", run, request.session.database.string(), outcome->summary);
+  sentence = outcome->summary.substr(outcome->summary.rfind('\n') + 1);
+  return outcome->exit_code;
+}
+
+std::string chain_head_of(const std::filesystem::path& database, storage::RunId run) {
+  const auto store = storage::RunStore::open_read_only(database);
+  if (!store) return "";
+  const auto runs = store->runs();
+  if (!runs) return "";
+  for (const storage::RunSummary& summary : *runs) {
+    if (summary.id == run) return summary.chain_head;
+  }
+  return "";
+}
+
+}  // namespace
+
+bool stop_was_requested() { return control.stop_requested(); }
+
+Result<void> await_condition(const rig::SensorConfig& sensor, const WaitCondition& condition) {
+  constexpr std::chrono::milliseconds kTurn{100};
+  const OrdersBySignal orders;
+  auto source = rig::make_sample_source(sensor);
+  if (!source) return fail(source.error());
+  rig::Acquisition acquisition(*std::move(source));
+  if (auto started = acquisition.start(); !started) return started;
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  double begin_s = kNever;
+  double inside_since_s = kNever;
+  const auto take = [&](double t_s, double value) {
+    begin_s = std::min(begin_s, t_s);
+    const bool inside = value >= condition.min && value <= condition.max;
+    inside_since_s = inside ? std::min(inside_since_s, t_s) : kNever;
+    return t_s - inside_since_s >= condition.hold_s;
+  };
+  while (!control.stop_requested()) {
+    tell_service_manager("waiting for " + condition.column);
+    const auto batch = acquisition.take(kTurn);
+    if (!batch) return fail(batch.error());
+    for (const RawSample& sample : batch->samples) {
+      if (condition.column == "temp_C" && take(sample.t_s, sample.temp_C)) return {};
+      if (sample.t_s - begin_s > condition.limit_s) {
+        return fail(
+            ErrorCode::rig,
+            fmt::format("{} was not within {} to {} for {} s in {} s of waiting", condition.column,
+                        condition.min, condition.max, condition.hold_s, condition.limit_s));
+      }
+    }
+    for (const rig::CovariateReading& reading : batch->covariates) {
+      if (reading.name == condition.column && take(reading.t_s, reading.value)) return {};
+    }
+  }
+  return fail(ErrorCode::rig, "stopped on request");
+}
+
+LiveRun live_run(const MeasureRequest& request) {
+  const RigDescription& rig = request.session.rig;
+  return {.serial = rig.run.dut.serial,
+          .database = request.session.database.string(),
+          .out = request.out.string(),
+          .started_utc = utc_now(),
+          .rate_hz = rig.sensor.rate_hz,
+          .adc = rig.sensor.adc};
+}
+
+Result<storage::RunId> measure(const MeasureRequest& request, LiveState& live, Notifier& notifier) {
+  const OrdersBySignal orders;
   ProgressDisplay display(stderr, isatty(STDERR_FILENO) != 0);
-  const auto session = run_session(request.session, control,
-                                   [&](const Progress& progress) { display.show(progress); });
+  const auto socket = ControlSocket::open(control_path(request.session.database), live, control);
+  if (!socket) return fail(socket.error());
+  const auto session = run_session(request.session, control, [&](const Progress& progress) {
+    live.update(progress);
+    notifier.update(progress);
+    display.show(progress);
+  });
   if (!session) return fail(session.error());
   if (session->outcome) return session->run;
   return fail(session->outcome.error().code,
@@ -54,18 +166,25 @@ Result<storage::RunId> measure(const MeasureRequest& request) {
                           session->outcome.error().message, request.resume_hint));
 }
 
-}  // namespace
-
 Result<ExitCode> measure_and_calibrate(const MeasureRequest& request) {
-  const auto run = measure(request);
-  if (!run) return fail(run.error());
-  auto job = job_from_database(request.session.database, *run, request.seed);
-  if (!job) return fail(job.error());
-  job->style = request.style;
-  const auto outcome = perform(*job, request.out);
-  if (!outcome) return fail(outcome.error());
-  fmt::print("run {} in {}\n{}\n", *run, request.session.database.string(), outcome->summary);
-  return outcome->exit_code;
+  LiveState live(live_run(request));
+  Notifier notifier(request.notify, live);
+  ExitSummary summary;
+  const auto run = measure(request, live, notifier);
+  Result<ExitCode> code = ExitCode::done;
+  if (run) {
+    notifier.calibrating();
+    code = calibrate_run(request, *run, summary.message);
+  } else {
+    code = fail(run.error());
+  }
+  summary.exit_code = code ? *code : exit_code_of(code.error().code);
+  if (!code) summary.message = code.error().message;
+  const storage::RunId begun = live.snapshot().progress.run;
+  if (!run && begun > 0) summary.resume = request.resume_hint;
+  if (begun > 0) summary.chain_head = chain_head_of(request.session.database, begun);
+  notifier.end(summary);
+  return code;
 }
 
 }  // namespace plumbline::app

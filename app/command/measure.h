@@ -6,6 +6,8 @@
 
 #include "app/calibration_job.h"
 #include "app/exit_code.h"
+#include "app/sequencer/job_queue.h"
+#include "app/sequencer/notifier.h"
 #include "app/sequencer/session.h"
 
 namespace plumbline::app {
@@ -14,12 +16,23 @@ struct MeasureRequest {
   SessionRequest session;
   std::filesystem::path out;
   std::uint64_t seed = 1;  ///< of the calibration
-  CertificateStyle style;
+  CertificateStyle style = {};
+  NotifyOptions notify = {};
   std::string resume_hint;  ///< the command that goes on with a run that has ended early
 };
 
-/// Runs the plan with a progress display, SIGINT and SIGTERM stopping it safely, then calibrates
-/// from the database into `out` and prints the summary.
+/// Runs the plan alone and says which run it became. `live` and `notifier` are told about it.
+Result<storage::RunId> measure(const MeasureRequest& request, LiveState& live, Notifier& notifier);
+/// Listens to the sensor until the condition is met; fails (rig) when it is not within its limit,
+/// when the sensor falls silent, and when a signal asks to stop.
+Result<void> await_condition(const rig::SensorConfig& sensor, const WaitCondition& condition);
+/// True once a signal or the control socket has asked to stop.
+bool stop_was_requested();
+/// What stays the same during the session, for LiveState.
+LiveRun live_run(const MeasureRequest& request);
+
+/// Runs the plan with a progress display, orders by signals and by the control socket, then
+/// calibrates from the database into `out` and prints the summary.
 Result<ExitCode> measure_and_calibrate(const MeasureRequest& request);
 
 }  // namespace plumbline::app

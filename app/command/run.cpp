@@ -22,6 +22,8 @@ struct RunArguments {
   std::string out;
   bool resume = false;
   CertificateOptions certificate;
+  NotifyOptions notify;
+  bool no_journal = false;
 };
 
 Result<ExitCode> run(const RunArguments& arguments) {
@@ -35,11 +37,16 @@ Result<ExitCode> run(const RunArguments& arguments) {
   const std::string hint =
       fmt::format("plumbline run --resume --config {} --serial {} --db {} --out {}",
                   arguments.config, rig->run.dut.serial, arguments.database, arguments.out);
-  return measure_and_calibrate(
-      {.session = {.rig = *rig, .database = arguments.database, .resume = arguments.resume},
-       .out = arguments.out,
-       .style = *style,
-       .resume_hint = hint});
+  NotifyOptions notify = arguments.notify;
+  if (notify.journal.empty() && !arguments.no_journal) notify.journal = arguments.database + ".log";
+  return measure_and_calibrate({.session = {.rig = *rig,
+                                            .database = arguments.database,
+                                            .out = arguments.out,
+                                            .resume = arguments.resume},
+                                .out = arguments.out,
+                                .style = *style,
+                                .notify = notify,
+                                .resume_hint = hint});
 }
 
 }  // namespace
@@ -55,6 +62,13 @@ void add_run(CLI::App& program, Invocation& invocation) {
   sub->add_option("--out", arguments->out, "folder for results and certificate")->required();
   sub->add_flag("--resume", arguments->resume, "go on with the unit's last unfinished run");
   add_certificate_options(*sub, arguments->certificate);
+  sub->add_option("--summary", arguments->notify.summary, "how it ended, as JSON, into this file");
+  sub->add_option("--hook", arguments->notify.hook,
+                  "shell command for every alarm and at the end; PLUMBLINE_EVENT and others say "
+                  "what happened");
+  sub->add_option("--journal", arguments->notify.journal,
+                  "every event as a line; rotated (default: DATABASE.log)");
+  sub->add_flag("--no-journal", arguments->no_journal, "keep no journal");
   sub->callback(
       [arguments, &invocation] { invocation.action = [arguments] { return run(*arguments); }; });
 }

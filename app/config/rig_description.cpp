@@ -12,7 +12,7 @@ namespace {
 
 using rig::StrictTable;
 
-constexpr const char* kRigTables[] = {"head", "sensor", "plan", "settling"};
+constexpr const char* kRigTables[] = {"head", "sensor", "plan", "settling", "recovery"};
 
 PlanOptions read_plan_options(StrictTable table) {
   PlanOptions plan;
@@ -47,6 +47,45 @@ SettlingOptions read_settling_options(StrictTable table) {
                  fmt::format("{} is shorter than hold_s = {}", settling.cap_s, settling.hold_s));
   }
   return settling;
+}
+
+RecoveryOptions read_recovery_options(StrictTable table) {
+  RecoveryOptions recovery;
+  const auto count = [&](const char* key, int fallback, rig::Range range) {
+    return static_cast<int>(table.integer_or(key, fallback, range));
+  };
+  recovery.attempts_per_pose = count("attempts_per_pose", recovery.attempts_per_pose, {1, 100});
+  recovery.recoveries_per_run =
+      count("recoveries_per_run", recovery.recoveries_per_run, {0, 100000});
+  recovery.skipped_poses = count("skipped_poses", recovery.skipped_poses, {0, 10000});
+  recovery.wait_s = table.number_or("wait_s", recovery.wait_s, {0, 1e6});
+  recovery.compare_tolerance =
+      table.number_or("compare_tolerance", recovery.compare_tolerance, {0, 1});
+  return recovery;
+}
+
+/// [[suspend]]: the column must be one that is recorded, or the condition could never be met.
+std::vector<SuspendCondition> read_suspend_conditions(StrictTable& root,
+                                                      const rig::SensorConfig& sensor) {
+  std::vector<std::string> columns = {"temp_C", kVibrationColumn};
+  for (const rig::CovariateSignal& signal : sensor.covariates) columns.push_back(signal.column);
+  std::vector<SuspendCondition> conditions;
+  for (StrictTable& table : root.tables("suspend")) {
+    SuspendCondition condition;
+    condition.column = table.has("column") ? table.choice_or("column", columns.front(), columns)
+                                           : table.text("column");
+    condition.min = table.number_or("min", condition.min, {});
+    condition.max = table.number_or("max", condition.max, {});
+    condition.hysteresis = table.number_or("hysteresis", condition.hysteresis, {0, 1e9});
+    condition.delay_s = table.number_or("delay_s", condition.delay_s, {0, 1e6});
+    condition.hold_s = table.number_or("hold_s", condition.hold_s, {0, 1e6});
+    if (!table.has("min") && !table.has("max")) table.refuse("column", "has neither min nor max");
+    if (condition.max - condition.min < 2 * condition.hysteresis) {
+      table.refuse("hysteresis", "leaves nothing of the band between min and max");
+    }
+    conditions.push_back(condition);
+  }
+  return conditions;
 }
 
 /// soft_limits = { delta_deg = [lower, upper], h_deg = [lower, upper] }
@@ -96,6 +135,8 @@ Result<RigDescription> parse_rig_description(std::string_view text, const std::s
   }
   rig.plan = read_plan_options(root.table("plan"));
   rig.settling = read_settling_options(root.table("settling"));
+  rig.recovery = read_recovery_options(root.table("recovery"));
+  rig.suspend = read_suspend_conditions(root, rig.sensor);
   if (auto done = file->finish(); !done) return fail(done.error());
   return rig;
 }

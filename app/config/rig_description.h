@@ -6,9 +6,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "app/sequencer/engine.h"
 #include "app/sequencer/plan.h"
 #include "app/sequencer/settling.h"
+#include "app/sequencer/suspend.h"
 #include "estimator/measurement.h"
 #include "rig/rig_config.h"
 #include "rig/strict_toml.h"
@@ -21,6 +24,8 @@ struct RigDescription {
   rig::SensorConfig sensor;
   PlanOptions plan;
   SettlingOptions settling;
+  RecoveryOptions recovery;
+  std::vector<SuspendCondition> suspend;
   /// [head] soft_limits, so that a plan can be checked without the drive.
   std::optional<rig::SoftLimits> soft_limits;
   std::string source;  ///< the text as it was read, to be stored with the run

@@ -25,11 +25,13 @@ Json json_axis_names(const std::vector<std::size_t>& axes) {
 Json json_provenance(const Provenance& provenance) {
   Json hashes = Json::object();
   for (const auto& [name, hash] : provenance.input_sha256) hashes[name] = hash;
-  return {{"program_version", program_version()},
-          {"input_sha256", hashes},
-          {"created_utc", provenance.created_utc},
-          {"seed", provenance.seed},
-          {"dut", {{"serial", provenance.dut.serial}, {"model", provenance.dut.model}}}};
+  Json json = {{"program_version", program_version()},
+               {"input_sha256", hashes},
+               {"created_utc", provenance.created_utc},
+               {"seed", provenance.seed},
+               {"dut", {{"serial", provenance.dut.serial}, {"model", provenance.dut.model}}}};
+  if (!provenance.chain_head.empty()) json["chain_head"] = provenance.chain_head;
+  return json;
 }
 
 Json json_noise_terms(const NoiseModel& noise, const std::string& unit) {

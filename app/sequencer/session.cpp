@@ -6,10 +6,12 @@
 #include <cmath>
 #include <ctime>
 #include <memory>
+#include <regex>
 #include <utility>
 
 #include "app/provenance.h"
 #include "app/sequencer/plan.h"
+#include "app/sequencer/sample_guard.h"
 
 namespace plumbline::app {
 
@@ -28,6 +30,13 @@ storage::RunHeader header_of(const RigDescription& rig, const Plan& plan) {
           .started_utc = utc_now(),
           .rate_hz = rig.sensor.rate_hz,
           .adc = rig.sensor.adc};
+}
+
+/// The text without the lines that say where drive and node are: after a replug they may have
+/// moved, and who they are is asked of themselves.
+std::string without_addresses(const std::string& toml) {
+  static const std::regex address(R"(^[ \t]*(modbus|can)[ \t]*=.*$)", std::regex::multiline);
+  return std::regex_replace(toml, address, "");
 }
 
 double seconds_since(const std::string& utc) {
@@ -65,6 +74,42 @@ std::vector<RawSample> soak_codes(const SampleTable& soak, const Adc& adc, doubl
   return samples;
 }
 
+Result<std::vector<PoseMean>> means_of(const storage::RunStore& store, storage::RunId run,
+                                       const Plan& plan, const Adc& adc) {
+  const auto poses = store.poses(run);
+  if (!poses) return fail(poses.error());
+  std::vector<PoseMean> means;
+  for (const storage::PoseRecord& pose : *poses) {
+    if (pose.kind == storage::PoseKind::soak) continue;
+    means.push_back(mean_of(pose, step_of(pose.ordinal, plan.steps.size()), adc));
+  }
+  return means;
+}
+
+/// What a whole run writes, events and the log of the database included, with a half to spare.
+std::uintmax_t bytes_needed(const Plan& plan, double rate_hz) {
+  constexpr double kBytesPerSample = 37 + 30;  // covariates beside them
+  constexpr double kBytesPerStep = 4096;
+  constexpr double kReserve = 1.5;
+  constexpr double kFixed = 16e6;  // result, certificate, write-ahead log
+  double samples = 0;
+  for (const PlanStep& step : plan.steps) samples += step.samples + 2 * rate_hz;
+  return static_cast<std::uintmax_t>(
+      kFixed + kReserve * (samples * kBytesPerSample +
+                           kBytesPerStep * static_cast<double>(plan.steps.size())));
+}
+
+Result<void> check_room(const std::filesystem::path& file, std::uintmax_t needed) {
+  std::error_code error;
+  const std::filesystem::path folder =
+      file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+  const auto space = std::filesystem::space(folder, error);
+  if (error || space.available >= needed) return {};  // the database says what is wrong there
+  return fail(ErrorCode::storage,
+              fmt::format("{}: {} MB are free and the run needs up to {} MB; make room first",
+                          folder.string(), space.available / 1'000'000, needed / 1'000'000 + 1));
+}
+
 Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& request,
                                 const Plan& plan) {
   const RigDescription& rig = request.rig;
@@ -93,7 +138,7 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
                     "configuration of then, or start a new run without --resume",
                     last->id));
   }
-  if (last->header.config_toml != rig.source) {
+  if (without_addresses(last->header.config_toml) != without_addresses(rig.source)) {
     return refuse(
         fmt::format("run {} was started with another configuration; resume it with that "
                     "one, or start a new run without --resume",
@@ -102,7 +147,17 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
   Started found{last->id, {}};
   auto committed = store.committed_poses(last->id);
   if (!committed) return fail(committed.error());
+  found.start.resumed = true;
   found.start.committed = *std::move(committed);
+  auto suspects = store.suspect_poses(last->id);
+  if (!suspects) return fail(suspects.error());
+  found.start.suspects = *std::move(suspects);
+  auto identity = store.identity(last->id);
+  if (!identity) return fail(identity.error());
+  found.start.identity = *std::move(identity);
+  auto means = means_of(store, last->id, plan, rig.sensor.adc);
+  if (!means) return fail(means.error());
+  found.start.means = *std::move(means);
   const auto stored = store.load(last->id);
   if (!stored) return fail(stored.error());
   found.start.t_s = clock_of_resumption(*stored, rig.sensor.rate_hz);
@@ -131,12 +186,31 @@ Result<Started> begin(storage::RunStore& store, const SessionRequest& request, c
 
 }  // namespace
 
+Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database) {
+  if (!std::filesystem::exists(database)) return false;
+  const auto store = storage::RunStore::open_read_only(database);
+  if (!store) return fail(store.error());
+  const auto runs = store->runs();
+  if (!runs) return fail(runs.error());
+  const Plan plan = make_plan(rig.run.grid, rig.plan, rig.sensor.rate_hz);
+  const storage::RunSummary* last = nullptr;
+  for (const storage::RunSummary& run : *runs) {
+    if (run.header.serial == rig.run.dut.serial) last = &run;
+  }
+  return last != nullptr && last->state != storage::RunState::finished &&
+         last->header.plan_csv == to_csv(plan) &&
+         without_addresses(last->header.config_toml) == without_addresses(rig.source);
+}
+
 Result<Session> run_session(const SessionRequest& request, const EngineControl& control,
                             const ProgressObserver& observer) {
   const RigDescription& rig = request.rig;
   const Plan plan = make_plan(rig.run.grid, rig.plan, rig.sensor.rate_hz);
   if (rig.soft_limits) {
     if (auto allowed = check_plan(plan, *rig.soft_limits); !allowed) return fail(allowed.error());
+  }
+  if (auto room = check_room(request.database, bytes_needed(plan, rig.sensor.rate_hz)); !room) {
+    return fail(room.error());
   }
   auto head = rig::make_dividing_head(rig.head);
   if (!head) return fail(head.error());
@@ -154,6 +228,10 @@ Result<Session> run_session(const SessionRequest& request, const EngineControl& 
   options.adc = rig.sensor.adc;
   options.motion = {rig.head.speed_deg_s, rig.head.acceleration_deg_s2};
   options.settling = rig.settling;
+  options.recovery = rig.recovery;
+  options.suspend = rig.suspend;
+  options.home_end_latched = rig.head.home_end_latched;
+  options.node_tells_identity = rig.sensor.tells_identity;
   options.poll_interval = rig.head.poll_interval;
   options.watchdog = rig.head.watchdog;
   Engine engine(**head, acquisition, *store, control, options, observer);

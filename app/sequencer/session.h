@@ -13,7 +13,8 @@ namespace plumbline::app {
 struct SessionRequest {
   const RigDescription& rig;
   std::filesystem::path database;
-  bool resume = false;  ///< go on with the last unfinished run of rig.run.dut.serial
+  std::filesystem::path out = {};  ///< shares the disk; only looked at
+  bool resume = false;             ///< go on with the last unfinished run of rig.run.dut.serial
 };
 
 /// A run that has been started: how it ended, and which one it is.
@@ -22,9 +23,14 @@ struct Session {
   Result<void> outcome;  ///< as of Engine::run()
 };
 
-/// Fails before anything moves when the plan, the database, the run to be resumed or the sensor bus
-/// refuses; a failure is then the whole result. A resumed run must have the same configuration and
-/// plan, word for word; its clock goes on by the time that has passed since its last event.
+/// Whether run_session() with `resume` would find a run to go on with: the unit's last run is
+/// unfinished and has this configuration and plan.
+Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database);
+
+/// Fails before anything moves when the plan, the room on the disk, the database, the run to be
+/// resumed or the sensor bus refuses; a failure is then the whole result. A resumed run must have
+/// the same configuration and plan, word for word (the addresses of drive and node excepted); its
+/// clock goes on by the time that has passed since its last event.
 Result<Session> run_session(const SessionRequest& request, const EngineControl& control,
                             const ProgressObserver& observer);
 

@@ -74,20 +74,21 @@ Result<SimulatedRig> SimulatedRig::start(const SimulatedRigOptions& options) {
 
 Result<void> SimulatedRig::launch(const SimulatedRigOptions& options) {
   const std::string program = program_path();
-  std::vector<std::string> words = {program,
-                                    "--world",
-                                    (folder_ / "world.toml").string(),
-                                    "--modbus",
-                                    "tcp:127.0.0.1:0",
-                                    "--can",
-                                    "unix:" + (folder_ / "can").string(),
-                                    "--speed",
-                                    fmt::format("{}", options.speed),
-                                    "--seed",
-                                    fmt::format("{}", options.seed),
-                                    "--ready-file",
-                                    (folder_ / "ready.toml").string(),
-                                    "--exit-with-parent"};
+  std::vector<std::string> words = {
+      program,
+      "--world",
+      (folder_ / "world.toml").string(),
+      "--modbus",
+      options.rtu ? "rtu:" + (folder_ / "line").string() : "tcp:127.0.0.1:0",
+      "--can",
+      "unix:" + (folder_ / "can").string(),
+      "--speed",
+      fmt::format("{}", options.speed),
+      "--seed",
+      fmt::format("{}", options.seed),
+      "--ready-file",
+      (folder_ / "ready.toml").string(),
+      "--exit-with-parent"};
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());

@@ -15,6 +15,7 @@ struct SimulatedRigOptions {
   std::string world_toml;  ///< text of the world file
   double speed = 1;
   std::uint64_t seed = 1;
+  bool rtu = false;  ///< Modbus on a pseudo terminal instead of TCP
 };
 
 /// Started on free endpoints, reached only over its wires. The child is not in the terminal's

@@ -19,6 +19,7 @@ CanNode::CanNode(Machine& machine, std::unique_ptr<FrameOutput> output, NodeFram
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 CanNode::~CanNode() {
+  machine_.attach_node(false);
   thread_.request_stop();
   thread_.join();
 }
@@ -29,18 +30,20 @@ std::optional<Error> CanNode::failure() const {
 }
 
 void CanNode::run(const std::stop_token& stop) {
+  machine_.attach_node(true);
   while (!stop.stop_requested()) {
     output_->service();
     if (auto sent = send_due(); !sent) {
+      machine_.attach_node(false);
       const std::lock_guard lock(mutex_);
       failure_ = sent.error();
       return;
     }
-    const std::chrono::duration<double> until_next(
-        (machine_.next_sample_s() - machine_.clock().now_s()) / machine_.clock().speed());
-    std::this_thread::sleep_for(std::clamp(std::chrono::ceil<std::chrono::microseconds>(until_next),
-                                           std::chrono::microseconds(kShortestSleep),
-                                           std::chrono::microseconds(kLongestSleep)));
+    const std::chrono::duration<double> until_next((machine_.next_sample_s() - machine_.now_s()) /
+                                                   machine_.speed());
+    machine_.wait_for_demand(std::clamp(std::chrono::ceil<std::chrono::microseconds>(until_next),
+                                        std::chrono::microseconds(kShortestSleep),
+                                        std::chrono::microseconds(kLongestSleep)));
   }
 }
 
@@ -50,6 +53,7 @@ Result<void> CanNode::send_due() {
       if (auto sent = output_->send(frame); !sent) return sent;
     }
   }
+  machine_.sent();
   return {};
 }
 

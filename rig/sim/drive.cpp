@@ -9,10 +9,16 @@ namespace {
 std::size_t axis_of(int address) { return static_cast<std::size_t>(address / kAxisBase); }
 int offset_of(int address) { return address % kAxisBase; }
 
+constexpr std::uint16_t kDriveType = 2;  // two axes
+constexpr std::uint16_t kFirmware = 0x0100;
+
 }  // namespace
 
 Drive::Drive(const DriveSettings& settings, const Faults& faults, std::uint64_t seed)
     : axes_{DriveAxis(settings, 0), DriveAxis(settings, 1)},
+      nameplate_{static_cast<std::uint16_t>(settings.serial_number >> 16),
+                 static_cast<std::uint16_t>(settings.serial_number & 0xFFFF), kDriveType,
+                 kFirmware},
       faults_(faults, FaultStage::drive, seed) {}
 
 void Drive::advance(double t_s) {
@@ -35,13 +41,14 @@ void Drive::note_request(HostTime now) {
 }
 
 Refusal Drive::check_read(int address, int count) {
-  const bool inside =
-      address >= 0 && address < kRegisterEnd && offset_of(address) + count <= reg::kCount;
-  return inside ? Refusal::none : Refusal::illegal_address;
+  const bool in_axis = address >= 0 && address < kAxisBase + reg::kCount &&
+                       offset_of(address) + count <= reg::kCount;
+  const bool in_nameplate = address >= kNameplate && address + count <= kRegisterEnd;
+  return in_axis || in_nameplate ? Refusal::none : Refusal::illegal_address;
 }
 
 Refusal Drive::check_write(int address, std::span<const std::uint16_t> words) {
-  if (address < 0 || address >= kRegisterEnd ||
+  if (address < 0 || address >= kAxisBase + reg::kCount ||
       !DriveAxis::writable(offset_of(address), static_cast<int>(words.size()))) {
     return Refusal::illegal_address;
   }
@@ -62,6 +69,7 @@ void Drive::image(double t_s, std::span<std::uint16_t> registers) const {
     const auto image = axes_[i].image(t_s, heartbeat_);
     std::copy(image.begin(), image.end(), registers.begin() + static_cast<int>(i) * kAxisBase);
   }
+  std::copy(nameplate_.begin(), nameplate_.end(), registers.begin() + kNameplate);
 }
 
 void Drive::apply(const std::vector<const Fault*>& faults, double t_s) {

@@ -14,7 +14,10 @@ namespace plumbline::sim {
 
 /// Registers of axis i start at i·0x100.
 inline constexpr int kAxisBase = 0x100;
-inline constexpr int kRegisterEnd = kAxisBase + reg::kCount;
+/// Read-only: serial number (u32), type and firmware of the drive.
+inline constexpr int kNameplate = 0x200;
+inline constexpr int kNameplateCount = 4;
+inline constexpr int kRegisterEnd = kNameplate + kNameplateCount;
 
 /// Modbus exception codes, as far as the drive itself gives them.
 enum class Refusal { none = 0, illegal_address = 2, illegal_value = 3 };
@@ -53,6 +56,7 @@ class Drive {
   void apply(const std::vector<const Fault*>& faults, double t_s);
 
   std::array<DriveAxis, 2> axes_;
+  std::array<std::uint16_t, kNameplateCount> nameplate_;
   std::array<std::int64_t, 2> starts_{};
   FaultInjector faults_;
   HostTime last_request_{};

@@ -37,6 +37,8 @@ void read_axis(rig::StrictTable table, AxisDynamics& axis) {
 DriveSettings read_drive(rig::StrictTable table) {
   DriveSettings drive;
   drive.unit_id = static_cast<int>(table.integer_or("unit_id", drive.unit_id, {1, 247}));
+  drive.serial_number = static_cast<std::uint32_t>(
+      table.integer_or("serial_number", drive.serial_number, {0, 4294967295.0}));
   drive.high_word_first =
       table.choice_or("word_order", "high_first", {"high_first", "low_first"}) == "high_first";
   const double counts = table.number_or("counts_per_deg", drive.counts_per_deg[0], {1, 1e6});

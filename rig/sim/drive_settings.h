@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "rig/sim/axis.h"
 #include "rig/strict_toml.h"
@@ -11,6 +12,7 @@ namespace plumbline::sim {
 /// Index 0 is the spindle δ, index 1 the tilt h.
 struct DriveSettings {
   int unit_id = 1;
+  std::uint32_t serial_number = 31415;
   bool high_word_first = true;
   std::array<double, 2> counts_per_deg = {10000, 10000};
   double following_error_deg = 0.5;  ///< raises alarm 10h

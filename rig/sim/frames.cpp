@@ -67,4 +67,11 @@ can_frame encode_environment(const NodeSample& sample) {
   return frame;
 }
 
+can_frame encode_identity(std::uint32_t serial_number) {
+  can_frame frame = empty_frame(kIdentity_id);
+  frame.can_dlc = 4;
+  put(frame, 0, 4, serial_number);
+  return frame;
+}
+
 }  // namespace plumbline::sim

@@ -16,6 +16,7 @@ namespace plumbline::sim {
 inline constexpr canid_t kFrameA_id = 416;
 inline constexpr canid_t kFrameB_id = 417;
 inline constexpr canid_t kEnvironment_id = 418;
+inline constexpr canid_t kIdentity_id = 419;
 
 /// Bit 0 of the status byte: some code of the sample is at the end of its range.
 inline constexpr std::uint8_t kStatusClipped = 0x01;
@@ -29,5 +30,8 @@ std::array<can_frame, 2> encode_sample(const NodeSample& sample);
 
 /// Humidity, supply voltage and motor current beside the samples.
 can_frame encode_environment(const NodeSample& sample);
+
+/// The node's serial number.
+can_frame encode_identity(std::uint32_t serial_number);
 
 }  // namespace plumbline::sim

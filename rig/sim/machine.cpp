@@ -1,9 +1,29 @@
 #include "rig/sim/machine.h"
 
+#include <algorithm>
+
 namespace plumbline::sim {
 
+namespace {
+
+/// Longest step of the world, in seconds of the host: longer than any pause of a node's thread on a
+/// machine that keeps up.
+constexpr double kLongestStep_s = 0.05;
+
+}  // namespace
+
+double Machine::now_s() {
+  const std::lock_guard lock(mutex_);
+  return clock_.now_s() - lost_s_;
+}
+
 double Machine::catch_up() {
-  const double now_s = clock_.now_s();
+  const double longest_s = kLongestStep_s * clock_.speed();
+  const double clock_s = clock_.now_s();
+  // Only with a node, which looks every few milliseconds: without one nobody need look for long.
+  if (node_attached_) lost_s_ = std::max(lost_s_, clock_s - now_s_ - longest_s);
+  const double now_s = clock_s - lost_s_;
+  now_s_ = now_s;
   while (unit_.next_time_s() <= now_s) {
     const double t_s = unit_.next_time_s();
     drive_.advance(t_s);
@@ -17,7 +37,36 @@ double Machine::catch_up() {
 std::vector<TimedSample> Machine::take_samples() {
   const std::lock_guard lock(mutex_);
   catch_up();
+  demanded_ = false;
+  taken_ += static_cast<std::int64_t>(samples_.size());
   return std::exchange(samples_, {});
+}
+
+void Machine::attach_node(bool attached) {
+  const std::lock_guard lock(mutex_);
+  node_attached_ = attached;
+  done_.notify_all();
+}
+
+void Machine::sent() {
+  const std::lock_guard lock(mutex_);
+  sent_ = taken_;
+  done_.notify_all();
+}
+
+void Machine::wait_until_sent() {
+  constexpr std::chrono::milliseconds kLongest{250};
+  std::unique_lock lock(mutex_);
+  const std::int64_t wanted = taken_ + static_cast<std::int64_t>(samples_.size());
+  if (sent_ >= wanted || !node_attached_) return;
+  demanded_ = true;
+  demand_.notify_all();
+  done_.wait_for(lock, kLongest, [&] { return sent_ >= wanted || !node_attached_; });
+}
+
+void Machine::wait_for_demand(std::chrono::microseconds timeout) {
+  std::unique_lock lock(mutex_);
+  demand_.wait_for(lock, timeout, [&] { return demanded_; });
 }
 
 double Machine::next_sample_s() {

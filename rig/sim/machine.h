@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <mutex>
 #include <utility>
@@ -41,7 +42,10 @@ class Machine {
   Machine(Drive drive, Unit unit, double speed)
       : clock_(speed), drive_(std::move(drive)), unit_(std::move(unit)) {}
 
-  const WorldClock& clock() const { return clock_; }
+  double speed() const { return clock_.speed(); }
+  /// World time. It falls behind the clock when this machine is too busy to keep up: the world then
+  /// runs slower for everybody, instead of leaping under the feet of whoever looks at it.
+  double now_s();
 
   /// Runs `use(drive, t_s)` on the drive at the present world time t_s.
   template <class Use>
@@ -56,14 +60,35 @@ class Machine {
   /// World time of the next sample.
   double next_sample_s();
 
+  // The node's frames are on its bus within a moment of the sample, and a reply of the drive does
+  // not overtake them however busy this machine is: whoever replies waits until the node has sent
+  // what has been taken so far.
+
+  /// A node that will call sent() has been attached (or detached).
+  void attach_node(bool attached);
+  /// The samples of the last take_samples() have been sent.
+  void sent();
+  /// Until everything taken so far has been sent; at most a quarter of a second.
+  void wait_until_sent();
+  /// For the node: until somebody waits in wait_until_sent(), or `timeout` has passed.
+  void wait_for_demand(std::chrono::microseconds timeout);
+
  private:
   double catch_up();
 
   std::mutex mutex_;
   WorldClock clock_;
+  double now_s_ = 0;   ///< world time of the last catch_up()
+  double lost_s_ = 0;  ///< how far it is behind the clock for good
   Drive drive_;
   Unit unit_;
   std::vector<TimedSample> samples_;
+  bool node_attached_ = false;
+  bool demanded_ = false;
+  std::int64_t taken_ = 0;  ///< samples handed out by take_samples()
+  std::int64_t sent_ = 0;   ///< of those, sent
+  std::condition_variable demand_;
+  std::condition_variable done_;
 };
 
 }  // namespace plumbline::sim

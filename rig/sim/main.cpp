@@ -75,7 +75,8 @@ Result<void> serve(const Options& options, const sigset_t& ending) {
                                    options.seed);
   if (!modbus) return fail(modbus.error());
   const CanNode node(machine, std::move(*output),
-                     NodeFrames(world->rate_hz, world->adc.bits, world->faults, options.seed));
+                     NodeFrames(world->rate_hz, world->adc.bits, world->faults, options.seed,
+                                world->node_serial_number));
   if (!options.ready_file.empty()) {
     auto written = write_ready_file(options.ready_file, (*modbus)->endpoint(), node.endpoint());
     if (!written) return written;

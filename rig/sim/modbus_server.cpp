@@ -257,6 +257,7 @@ bool ModbusServer::answer(std::size_t client, std::span<std::uint8_t> request,
   if (const Fault* cut = acting(FaultKind::modbus_truncated)) {
     reply.resize(std::min(reply.size(), static_cast<std::size_t>(cut->value)));
   }
+  machine_.wait_until_sent();
   if (const Fault* late = acting(FaultKind::modbus_late)) sleep_unless_stopped(late->value, stop);
 
   const int fd = clients_[client].get();

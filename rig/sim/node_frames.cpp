@@ -19,8 +19,11 @@ can_frame error_frame(std::uint32_t error_class) {
 
 }  // namespace
 
-NodeFrames::NodeFrames(double rate_hz, int bits, const Faults& faults, std::uint64_t seed)
+NodeFrames::NodeFrames(double rate_hz, int bits, const Faults& faults, std::uint64_t seed,
+                       std::uint32_t serial_number)
     : samples_per_environment_(std::max(1L, std::lround(rate_hz / kEnvironmentRate_hz))),
+      samples_per_identity_(std::max(1L, std::lround(rate_hz))),
+      serial_number_(serial_number),
       largest_code_((std::int32_t{1} << (bits - 1)) - 1),
       sample_faults_(faults, FaultStage::sample, seed),
       frame_faults_(faults, FaultStage::frame, seed) {}
@@ -56,6 +59,9 @@ std::vector<can_frame> NodeFrames::at(NodeSample sample, std::int64_t moves) {
   for (const can_frame& frame : encode_sample(sample)) put(out, frame, sample.t_s, moves);
   if (sample.counter % samples_per_environment_ == 0) {
     put(out, encode_environment(sample), sample.t_s, moves);
+  }
+  if (serial_number_ != 0 && sample.counter % samples_per_identity_ == 0) {
+    put(out, encode_identity(serial_number_), sample.t_s, moves);
   }
   return out;
 }

@@ -17,8 +17,10 @@ namespace plumbline::sim {
 /// What a node sends, faults included, as a stream of frames. No clock and no thread of its own.
 class NodeFrames {
  public:
-  /// `rate_hz` is the node's sample rate, `bits` the width of its codes.
-  NodeFrames(double rate_hz, int bits, const Faults& faults, std::uint64_t seed);
+  /// `rate_hz` is the node's sample rate, `bits` the width of its codes; a `serial_number` other
+  /// than 0 is sent once a second.
+  NodeFrames(double rate_hz, int bits, const Faults& faults, std::uint64_t seed,
+             std::uint32_t serial_number = 0);
 
   /// The frames that go out at this sample, taken after `moves` motions had been started.
   std::vector<can_frame> at(NodeSample sample, std::int64_t moves);
@@ -27,6 +29,8 @@ class NodeFrames {
   void put(std::vector<can_frame>& out, const can_frame& frame, double t_s, std::int64_t moves);
 
   std::int64_t samples_per_environment_;
+  std::int64_t samples_per_identity_;
+  std::uint32_t serial_number_;
   std::int32_t largest_code_;
   FaultInjector sample_faults_;
   FaultInjector frame_faults_;

@@ -51,6 +51,8 @@ void read_electronics(StrictTable adc, StrictTable node, World& world) {
   world.adc.max_V = adc.number_or("max_V", world.adc.max_V);
   if (!(world.adc.min_V < world.adc.max_V)) adc.refuse("max_V", "must be above min_V");
   world.rate_hz = node.number_or("rate_hz", world.rate_hz, {1, 20000});
+  world.node_serial_number = static_cast<std::uint32_t>(
+      node.integer_or("serial_number", world.node_serial_number, {0, 4294967295.0}));
 }
 
 void read_noise_terms(StrictTable table, double volts_per_g, NoiseTerms& terms) {

@@ -113,8 +113,9 @@ struct World {
   Triad triad;
   UnitScatter scatter;
 
-  Adc adc;               ///< 12 to 24 bits
-  double rate_hz = 100;  ///< of the node's sample clock
+  Adc adc;                                  ///< 12 to 24 bits
+  double rate_hz = 100;                     ///< of the node's sample clock
+  std::uint32_t node_serial_number = 2718;  ///< 0: the node does not send it
   Gravity gravity{9.81012,
                   0.00002};  ///< local_mps2 is the truth, u_mps2 what the laboratory states
   double reference_C = 20;   ///< T₀ of the temperature effects

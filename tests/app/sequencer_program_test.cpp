@@ -40,6 +40,8 @@ h_deg = { start = 0, stop = 40, step = 20 }
 soak_s = 10
 samples_per_pose = 20
 verification_poses = 2
+[recovery]
+wait_s = 2
 )";
 constexpr long long kSteps = 15;
 

@@ -17,111 +17,14 @@
 #include <string>
 #include <thread>
 
-#include "app/config/rig_description.h"
-#include "app/sequencer/session.h"
-#include "app/sequencer/simulated_rig.h"
+#include "tests/app/sequencer_fixture.h"
 
 namespace plumbline::app {
 namespace {
 
-namespace fs = std::filesystem;
-using std::chrono::milliseconds;
 using storage::PoseKind;
 using storage::RunState;
 using testing::HasSubstr;
-
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr double kSpeed = 20;  // what the simulator keeps up with when it is instrumented
-#else
-constexpr double kSpeed = 100;
-#endif
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-const fs::path kWorlds = fs::path(PLUMBLINE_SOURCE_DIR) / "rig/sim/worlds";
-
-/// 4 × 3 positions, 2 verification poses, a soak of 20 s.
-constexpr const char* kSmallRig = R"(
-[dut]
-serial = "SIM-0001"
-[gravity]
-local_mps2 = 9.81012
-[grid]
-delta_deg = { start = 0, stop = 270, step = 90 }
-h_deg = { start = 0, stop = 40, step = 20 }
-[sensor.covariates]
-rh_pct = "ENV.Humidity"
-[plan]
-soak_s = 20
-samples_per_pose = 20
-verification_poses = 2
-)";
-constexpr std::size_t kSteps = 1 + 12 + 2;
-
-class SequencerRun : public testing::Test {
- protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "plumbline-run-XXXXXX").string();
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-    configure(kSmallRig);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  void configure(const std::string& text) {
-    auto rig = parse_rig_description(text, "rig.toml");
-    ASSERT_TRUE(rig.has_value()) << rig.error().message;
-    rig_ = *std::move(rig);
-    rig_.head.poll_interval = milliseconds{2};
-  }
-
-  void start_rig(const std::string& more_world = "") {
-    auto simulated = SimulatedRig::start(
-        {.world_toml = text_of(kWorlds / "white.toml") + more_world, .speed = kSpeed, .seed = 7});
-    ASSERT_TRUE(simulated.has_value()) << simulated.error().message;
-    simulated_ = std::make_unique<SimulatedRig>(*std::move(simulated));
-    rig_.head.modbus = simulated_->modbus();
-    rig_.sensor.can = simulated_->can();
-  }
-
-  fs::path database() const { return folder_ / "run.db"; }
-
-  Result<Session> run(bool resume = false, const ProgressObserver& observer = {}) {
-    return run_session({.rig = rig_, .database = database(), .resume = resume}, control_, observer);
-  }
-
-  storage::StoredRun stored(storage::RunId id = 1) {
-    auto store = storage::RunStore::open_read_only(database());
-    EXPECT_TRUE(store.has_value()) << store.error().message;
-    auto run = store->load(id);
-    EXPECT_TRUE(run.has_value()) << run.error().message;
-    return *std::move(run);
-  }
-
-  /// The head, asked by a second master after the run.
-  void expect_motors_at_rest() {
-    auto head = rig::make_dividing_head(rig_.head);
-    ASSERT_TRUE(head.has_value());
-    ASSERT_TRUE((*head)->connect().has_value());
-    const auto first = (*head)->status();
-    ASSERT_TRUE(first.has_value()) << first.error().message;
-    EXPECT_FALSE(first->moving);
-    std::this_thread::sleep_for(std::chrono::duration<double>(2 / kSpeed));  // 2 s for the rig
-    const auto later = (*head)->status();
-    ASSERT_TRUE(later.has_value());
-    EXPECT_EQ(first->actual.delta_deg, later->actual.delta_deg);
-    EXPECT_EQ(first->actual.h_deg, later->actual.h_deg);
-    EXPECT_EQ(later->alarm[0], 0) << rig::alarm_text(later->alarm[0]);
-  }
-
-  fs::path folder_;
-  RigDescription rig_;
-  std::unique_ptr<SimulatedRig> simulated_;
-  EngineControl control_;
-};
 
 void expect_complete(const storage::StoredRun& run) {
   EXPECT_EQ(run.summary.state, RunState::finished);
@@ -222,7 +125,7 @@ TEST_F(SequencerRun, RefusesToResumeAnotherPlan) {
 }
 
 TEST_F(SequencerRun, RefusesAPlanBeyondTheDrivesLimits) {
-  configure(std::string(kSmallRig) + "order = \"spiral\"\n");
+  rig_.plan.order = VisitOrder::spiral;
   start_rig();
   const auto session = run();
   ASSERT_TRUE(session.has_value()) << session.error().message;

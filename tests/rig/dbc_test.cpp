@@ -10,7 +10,7 @@ using Bytes = std::vector<std::uint8_t>;
 TEST(Dbc, DefaultLayoutParses) {
   const auto dbc = parse_dbc(default_dbc_text(), "plumbline.dbc");
   ASSERT_TRUE(dbc) << dbc.error().message;
-  ASSERT_EQ(dbc->messages.size(), 3u);
+  ASSERT_EQ(dbc->messages.size(), 4u);
   EXPECT_EQ(dbc->messages[0].id, 416u);
   EXPECT_EQ(dbc->messages[0].name, "ACC_A");
   const DbcSignal* temp = dbc->find("ACC_B")->find("Temp");

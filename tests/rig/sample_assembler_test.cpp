@@ -167,6 +167,31 @@ TEST_F(Assembler, RestartedNodeIsNoticed) {
   EXPECT_TRUE(assembler.counter_went_back());
 }
 
+TEST_F(Assembler, ARestartedNodeThatIsAcceptedGoesOnInTime) {
+  for (int counter = 20000; counter < 20010; ++counter) push(counter);
+  for (int counter = 0; counter < 100; ++counter) push(counter);
+  assembler.start_anew(250.4);  // samples that would have come in the meantime
+  EXPECT_FALSE(assembler.counter_went_back());
+  for (int counter = 100; counter < 103; ++counter) push(counter);
+  ASSERT_EQ(samples.size(), 13u);
+  EXPECT_EQ(samples[10].counter, 20009 + 250);
+  EXPECT_EQ(samples[11].counter, 20009 + 251);
+  EXPECT_NEAR(samples[10].t_s - samples[9].t_s, 2.50, 1e-9);
+  EXPECT_NEAR(samples[11].t_s - samples[10].t_s, 0.01, 1e-9);
+  push(101);  // a latecomer of the new count
+  EXPECT_EQ(samples.size(), 13u);
+}
+
+TEST(CounterUnwrapper, GoesOnAfterANewStart) {
+  CounterUnwrapper unwrapper;
+  unwrapper.start_anew(5);  // before the first one: nothing to go on from
+  EXPECT_EQ(unwrapper.accept(60000, 0), 60000);
+  unwrapper.start_anew(0);  // at least one
+  EXPECT_EQ(unwrapper.accept(7, 0), 60001);
+  EXPECT_EQ(unwrapper.accept(8, 0), 60002);
+  EXPECT_EQ(unwrapper.accept(7, 0), std::nullopt);
+}
+
 TEST(CounterUnwrapper, LongSilenceIsCountedInRounds) {
   CounterUnwrapper unwrapper;
   EXPECT_EQ(unwrapper.accept(100, 0), 100);

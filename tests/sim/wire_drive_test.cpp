@@ -256,7 +256,9 @@ TEST_F(WireDrive, AddressesAndValues) {
   EXPECT_EQ(Drive::check_read(0x00, 0x2E), Refusal::illegal_address);
   EXPECT_EQ(Drive::check_read(0x2D, 1), Refusal::illegal_address);
   EXPECT_EQ(Drive::check_read(0x120, 0x0D), Refusal::none);
-  EXPECT_EQ(Drive::check_read(0x200, 1), Refusal::illegal_address);
+  EXPECT_EQ(Drive::check_read(0x200, 4), Refusal::none) << "the nameplate";
+  EXPECT_EQ(Drive::check_read(0x200, 5), Refusal::illegal_address);
+  EXPECT_EQ(Drive::check_read(0x1FF, 1), Refusal::illegal_address);
   const auto ones = [](std::size_t n) { return std::vector<std::uint16_t>(n, 1); };
   EXPECT_EQ(Drive::check_write(0x00, ones(12)), Refusal::none);
   EXPECT_EQ(Drive::check_write(0x00, ones(13)), Refusal::illegal_address);

@@ -143,5 +143,23 @@ TEST(WireFrames, ErrorFrameIsBusOff) {
   EXPECT_EQ(all[3].can_dlc, 8);
 }
 
+TEST(Frames, TheSerialNumberIsSentOnceASecond) {
+  const can_frame identity = encode_identity(0x01020304);
+  EXPECT_EQ(identity.can_id, 419u);
+  EXPECT_EQ(identity.can_dlc, 4);
+  EXPECT_EQ(identity.data[0], 4);
+  EXPECT_EQ(identity.data[3], 1);
+  NodeFrames frames(10, 16, {}, 1, 7);
+  NodeFrames anonymous(10, 16, {}, 1);
+  int sent = 0;
+  for (int counter = 0; counter < 30; ++counter) {
+    NodeSample sample;
+    sample.counter = counter;
+    for (const can_frame& frame : frames.at(sample, 0)) sent += frame.can_id == kIdentity_id;
+    for (const can_frame& frame : anonymous.at(sample, 0)) EXPECT_NE(frame.can_id, kIdentity_id);
+  }
+  EXPECT_EQ(sent, 3);
+}
+
 }  // namespace
 }  // namespace plumbline::sim

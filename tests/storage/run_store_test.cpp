@@ -221,6 +221,30 @@ TEST_F(RunStoreTest, MeasuredRowsCannotBeChanged) {
   EXPECT_THAT(changed.error().message, EndsWith("measured data are never changed"));
 }
 
+TEST_F(RunStoreTest, ASuspectPoseStaysStoredButOutOfTheRun) {
+  RunStore store = open();
+  const RunId run = store.create_run(example_header()).value();
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(store.commit_pose(run, example_pose(i)));
+  ASSERT_TRUE(store.suspect_pose(run, 1, "the head had slipped"));
+  EXPECT_THAT(store.committed_poses(run).value(), ElementsAre(0, 2));
+  EXPECT_EQ(store.runs().value().front().poses, 2);
+  EXPECT_EQ(store.load(run).value().grid.poses.size(), 2u);
+  EXPECT_THAT(store.check_chain(run).value().faults, IsEmpty());
+  EXPECT_FALSE(store.suspect_pose(run, 1, "twice"));
+  const auto database = Database::open(file_, OpenMode::create).value();
+  EXPECT_EQ(database->integer("SELECT count(*) FROM pose").value(), 3);
+}
+
+TEST_F(RunStoreTest, TheRigOfARunIsStatedOnce) {
+  RunStore store = open();
+  const RunId run = store.create_run(example_header()).value();
+  EXPECT_FALSE(store.identity(run).value());
+  ASSERT_TRUE(store.set_identity(run, {"drive 1", "node 2"}));
+  EXPECT_EQ(store.identity(run).value()->drive, "drive 1");
+  EXPECT_EQ(store.identity(run).value()->node, "node 2");
+  EXPECT_FALSE(store.set_identity(run, {"drive 3", "node 2"}));
+}
+
 TEST_F(RunStoreTest, ForReadingTheFileMustBeThereAndOurs) {
   const auto refusal = [&] {
     const auto store = RunStore::open_read_only(file_);

@@ -52,11 +52,11 @@ TEST_F(SchemaTest, AnOlderDatabaseIsBroughtUpToDateWithItsData) {
   const auto early = check_schema(*database(OpenMode::read_only), steps);
   ASSERT_FALSE(early);
   EXPECT_EQ(early.error().code, ErrorCode::input);
-  EXPECT_THAT(early.error().message, HasSubstr("has schema 1 and this program reads 2"));
+  EXPECT_THAT(early.error().message, HasSubstr("has schema 2 and this program reads 3"));
 
   const auto db = database();
   ASSERT_TRUE(migrate(*db, steps));
-  EXPECT_EQ(db->integer("PRAGMA user_version").value(), 2);
+  EXPECT_EQ(db->integer("PRAGMA user_version").value(), 3);
   EXPECT_EQ(db->integer("SELECT count(*) FROM run WHERE operator = '?'").value(), 1);
   EXPECT_EQ(db->integer("SELECT count(*) FROM pose").value(), 1);
   EXPECT_TRUE(check_schema(*database(OpenMode::read_only), steps));
@@ -68,8 +68,8 @@ TEST_F(SchemaTest, AFailedMigrationChangesNothing) {
   const auto done = migrate(*db, with_next("CREATE TABLE extra (x); SELECT no_such_function()"));
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().code, ErrorCode::storage);
-  EXPECT_THAT(done.error().message, EndsWith("(while migrating to schema 2)"));
-  EXPECT_EQ(db->integer("PRAGMA user_version").value(), 1);
+  EXPECT_THAT(done.error().message, EndsWith("(while migrating to schema 3)"));
+  EXPECT_EQ(db->integer("PRAGMA user_version").value(), 2);
   EXPECT_EQ(db->integer("SELECT count(*) FROM sqlite_schema WHERE name = 'extra'").value(), 0);
   EXPECT_TRUE(RunStore::open(file_)) << "still usable";
 }
@@ -80,8 +80,8 @@ TEST_F(SchemaTest, ADatabaseOfANewerProgramIsRefused) {
     ASSERT_FALSE(store);
     EXPECT_EQ(store.error().code, ErrorCode::input);
     EXPECT_THAT(store.error().message,
-                EndsWith("runs.db: was written by a newer plumbline (schema 2, this program knows "
-                         "1); use a program at least that new"));
+                EndsWith("runs.db: was written by a newer plumbline (schema 3, this program knows "
+                         "2); use a program at least that new"));
   }
 }
 

@@ -1,0 +1,212 @@
+#include "tests/battery/battery.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "rig/sim/head_errors.h"
+#include "rig/sim/world.h"
+#include "storage/database.h"
+#include "storage/sample_blob.h"
+
+namespace plumbline::battery {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+constexpr const char* kWorld = R"(
+[unit]
+random = true
+[noise]
+N = 1.0e-5
+)";
+
+}  // namespace
+
+Folder::Folder(const std::string& parent) {
+  std::string pattern = parent + "/plumbline-battery-XXXXXX";
+  if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  path_ = pattern;
+}
+
+Folder::~Folder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+Bench::Bench(const Folder& folder, RigChoice choice)
+    : choice_(std::move(choice)), config_(folder / "rig.toml") {
+  const auto world = sim::parse_world(kWorld + choice_.world, "world");
+  if (!world) throw std::runtime_error(world.error().message);
+  const sim::Triad triad = sim::draw_triad(*world, choice_.seed);
+  K_V_per_g_ = triad.K_V_per_g;
+  U0_V_ = triad.U0_V;
+  gamma_ = world->gravity.local_mps2 / kStandardGravity_mps2;
+  adc_ = world->adc;
+  restart();
+}
+
+void Bench::restart() {
+  rig_.reset();
+  auto rig = app::SimulatedRig::start({.world_toml = kWorld + choice_.world,
+                                       .speed = choice_.speed,
+                                       .seed = choice_.seed,
+                                       .rtu = choice_.rtu});
+  if (!rig) throw std::runtime_error(rig.error().message);
+  rig_ = std::make_unique<app::SimulatedRig>(*std::move(rig));
+  std::ofstream(config_)
+      << "[dut]\nserial = \"B-1\"\n[gravity]\nlocal_mps2 = 9.81012\n"
+      << "[head]\nmodbus = \"" << rig_->modbus() << "\"\npoll_interval_ms = 2\nwatchdog_ms = 1000\n"
+      << "response_timeout_ms = 200\nidentity_address = 0x200\nidentity_count = 4\n"
+      << "[sensor]\nsilence_timeout_ms = 100\ncan = \"" << rig_->can()
+      << "\"\nidentity = \"IDENT.Serial\"\n"
+      << choice_.plan;
+}
+
+double Bench::error_V(const storage::PoseRecord& pose) const {
+  const auto up = sim::attitude({}, pose.delta_deg, pose.h_deg).up;
+  double worst = 0;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    double truth = U0_V_[axis];
+    for (std::size_t j = 0; j < kAxisCount; ++j) truth += K_V_per_g_[axis][j] * gamma_ * up[j];
+    double mean = 0;
+    for (const RawSample& sample : pose.samples) {
+      mean += adc_.volts(sample.code[axis]) / static_cast<double>(pose.samples.size());
+    }
+    worst = std::max(worst, std::abs(mean - truth));
+  }
+  return worst;
+}
+
+Program::Program(const Bench& bench, const fs::path& database, const Folder& folder, bool resume,
+                 const std::map<std::string, std::string>& environment)
+    : err_(folder / "err") {
+  std::vector<std::string> words = {std::string(PLUMBLINE_BINARY_DIR) + "/plumbline",
+                                    "run",
+                                    "--config",
+                                    bench.config(),
+                                    "--serial",
+                                    "B-1",
+                                    "--db",
+                                    database,
+                                    "--out",
+                                    folder / "out"};
+  if (resume) words.emplace_back("--resume");
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  std::vector<std::string> settings;
+  for (char** entry = environ; *entry != nullptr; ++entry) settings.emplace_back(*entry);
+  for (const auto& [name, value] : environment) settings.push_back(name + "=" + value);
+  std::vector<char*> pointers;
+  for (std::string& setting : settings) pointers.push_back(setting.data());
+  pointers.push_back(nullptr);
+
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&files, STDERR_FILENO, err_.c_str(),
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  const int failed =
+      posix_spawn(&process_, words[0].c_str(), &files, nullptr, arguments.data(), pointers.data());
+  posix_spawn_file_actions_destroy(&files);
+  if (failed != 0) throw std::runtime_error("plumbline cannot be started");
+}
+
+Program::~Program() {
+  if (ended_) return;
+  ::kill(process_, SIGKILL);
+  ::waitpid(process_, nullptr, 0);
+}
+
+bool Program::running() {
+  if (!ended_) ended_ = ::waitpid(process_, &status_, WNOHANG) == process_;
+  return !ended_;
+}
+
+Ended Program::wait() {
+  if (!ended_) ::waitpid(process_, &status_, 0);
+  ended_ = true;
+  return {WIFEXITED(status_) ? WEXITSTATUS(status_) : -WTERMSIG(status_), text_of(err_)};
+}
+
+Audit audit(const fs::path& database, const std::map<long long, std::string>& before) {
+  Audit result;
+  const auto complain = [&](const std::string& what) { result.faults.push_back(what); };
+  if (!fs::exists(database)) {
+    if (!before.empty()) complain("the database is gone");
+    return result;
+  }
+  {
+    // As the next session would open it: recovers the write-ahead log.
+    auto store = storage::RunStore::open(database);
+    if (!store) {
+      complain(store.error().message);
+      return result;
+    }
+    const auto runs = store->runs();
+    if (!runs) {
+      complain(runs.error().message);
+      return result;
+    }
+    result.any_run = !runs->empty();
+    for (const storage::RunSummary& run : *runs) {
+      result.state = run.state;
+      const auto chain = store->check_chain(run.id);
+      if (!chain) {
+        complain(chain.error().message);
+        continue;
+      }
+      for (const std::string& fault : chain->faults) complain("chain: " + fault);
+    }
+    if (!runs->empty()) {
+      const auto poses = store->poses(runs->back().id);
+      if (!poses) {
+        complain(poses.error().message);
+        return result;
+      }
+      for (const storage::PoseRecord& pose : *poses) {
+        const auto bytes = storage::pack_samples(pose.samples);
+        std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+        if (!result.poses.emplace(pose.ordinal, std::move(text)).second) {
+          complain(fmt::format("pose {} is doubled", pose.ordinal));
+        }
+      }
+    }
+  }
+  const auto sound = storage::Database::open(database, storage::OpenMode::create);
+  std::string verdict;
+  if (!sound || !(*sound)->each("PRAGMA integrity_check",
+                                [&](const storage::Statement& row) { verdict += row.text(0); })) {
+    verdict = "cannot be checked";
+  }
+  if (verdict != "ok") complain("integrity_check: " + verdict);
+  for (const auto& [ordinal, bytes] : before) {
+    const auto now = result.poses.find(ordinal);
+    if (now == result.poses.end()) {
+      complain(fmt::format("pose {} is lost", ordinal));
+    } else if (now->second != bytes) {
+      complain(fmt::format("pose {} has changed", ordinal));
+    }
+  }
+  return result;
+}
+
+std::string shim_path() { return std::string(PLUMBLINE_BINARY_DIR) + "/libplumbline_disk_shim.so"; }
+
+}  // namespace plumbline::battery

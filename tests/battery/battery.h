@@ -1,0 +1,100 @@
+// What the batteries share: a folder, the real simulated rig, the real program with its
+// environment, and what is true of the unit it simulates.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "app/sequencer/simulated_rig.h"
+#include "estimator/measurement.h"
+#include "storage/run_store.h"
+
+namespace plumbline::battery {
+
+/// Removed at the end.
+class Folder {
+ public:
+  explicit Folder(const std::string& parent = "/tmp");
+  ~Folder();
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+struct RigChoice {
+  std::string world = "";  ///< appended to a world of white noise on an ideal head
+  std::string plan = "";   ///< appended to the rig.toml: [grid], [plan] … of the battery
+  double speed = 100;
+  bool rtu = false;  ///< the drive on a serial line (pseudo terminal)
+  std::uint64_t seed = 7;
+};
+
+/// A rig and its rig.toml in `folder`; throws when it does not start.
+class Bench {
+ public:
+  Bench(const Folder& folder, RigChoice choice);
+  /// Ends the simulated rig (if it lives) and starts it anew on other wires.
+  void restart();
+  const app::SimulatedRig& rig() const { return *rig_; }
+  std::filesystem::path config() const { return config_; }
+  /// How far the mean of a pose is from the truth on its worst axis, in V.
+  double error_V(const storage::PoseRecord& pose) const;
+
+ private:
+  RigChoice choice_;
+  std::filesystem::path config_;
+  std::unique_ptr<app::SimulatedRig> rig_;
+  PerAxis<PerAxis<double>> K_V_per_g_{};
+  PerAxis<double> U0_V_{};
+  double gamma_ = 1;
+  Adc adc_;
+};
+
+struct Ended {
+  int code = 0;  ///< exit code, or −signal
+  std::string err;
+};
+
+/// `plumbline run` on the bench, as a process of its own.
+class Program {
+ public:
+  Program(const Bench& bench, const std::filesystem::path& database, const Folder& folder,
+          bool resume, const std::map<std::string, std::string>& environment = {});
+  ~Program();
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+  pid_t process() const { return process_; }
+  bool running();
+  Ended wait();
+
+ private:
+  pid_t process_ = -1;
+  int status_ = 0;
+  bool ended_ = false;
+  std::filesystem::path err_;
+};
+
+/// Looks at the database of one unit's last run: sound, chained, nothing doubled, and every pose in
+/// `before` still there as it was. Returns what is wrong, one line each.
+struct Audit {
+  std::vector<std::string> faults;
+  std::map<long long, std::string> poses;  ///< ordinal → its bytes
+  storage::RunState state = storage::RunState::running;
+  bool any_run = false;
+};
+Audit audit(const std::filesystem::path& database,
+            const std::map<long long, std::string>& before = {});
+
+/// Path of the shim (disk_shim.cpp).
+std::string shim_path();
+
+}  // namespace plumbline::battery

@@ -1,0 +1,248 @@
+// Faults of the drive's wire, of the drive and of the sensor bus at many moments: every run ends in
+// good order, and no pose holds a wrong value – the truth is known to the simulated unit.
+//
+//   battery_wire modbus [--count N] [--seed S] [--rtu]
+//   battery_wire drive  [--count N] [--seed S]
+//   battery_wire can    [--count N] [--seed S]
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <random>
+
+#include "tests/battery/battery.h"
+
+namespace plumbline::battery {
+namespace {
+
+constexpr const char* kPlan = R"(
+[plan]
+soak_s = 5
+samples_per_pose = 20
+verification_poses = 0
+[settling]
+window = 10
+[grid]
+delta_deg = { start = 0, stop = 270, step = 90 }
+h_deg = { start = 0, stop = 40, step = 20 }
+[recovery]
+wait_s = 20
+)";
+constexpr std::size_t kPoses = 13;
+/// Noise of 0.1 mV a sample and 20 samples: 0.02 mV; a wrong angle of 0.1° gives 0.06 mV.
+constexpr double kWrong_V = 2.5e-4;
+
+std::string fault(const std::string& kind, const std::string& rest) {
+  return fmt::format("\n[[faults]]\nkind = \"{}\"\n{}\n", kind, rest);
+}
+
+struct Case {
+  std::string name;
+  std::string world;
+  std::string plan;
+  bool may_fail = false;  ///< ending the run safely is right, too
+};
+
+struct Counts {
+  int runs = 0;
+  int finished = 0;
+  int ended_safely = 0;
+  int poses = 0;
+  int wrong = 0;
+  int faults = 0;
+};
+
+void run_case(const Case& one, double speed, bool rtu, std::uint64_t seed, Counts& counts) {
+  const Folder folder;
+  Bench bench(
+      folder,
+      {.world = one.world, .plan = kPlan + one.plan, .speed = speed, .rtu = rtu, .seed = seed});
+  const auto database = folder / "run.db";
+  const auto complain = [&](const std::string& what) {
+    fmt::print("battery-wire: {} (seed {}): {}\n", one.name, seed, what);
+    ++counts.faults;
+  };
+  const auto begin = std::chrono::steady_clock::now();
+  Ended ended;
+  {
+    Program program(bench, database, folder, false);
+    ended = program.wait();
+  }
+  const double took_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ++counts.runs;
+  if (took_s > 120) complain(fmt::format("took {:.0f} s", took_s));
+  if (ended.code == 0 || ended.code == 1) {
+    ++counts.finished;
+  } else if (ended.code == 3 && one.may_fail) {
+    ++counts.ended_safely;
+  } else {
+    complain(fmt::format("ended with {}: {}", ended.code, ended.err));
+  }
+  const Audit now = audit(database);
+  for (const std::string& what : now.faults) complain(what);
+  if (ended.code == 0 && now.poses.size() != kPoses) {
+    complain(fmt::format("{} poses instead of {}", now.poses.size(), kPoses));
+  }
+  auto store = storage::RunStore::open_read_only(database);
+  if (!store) return complain(store.error().message);
+  const auto poses = store->poses(1);
+  if (!poses) return complain(poses.error().message);
+  for (const storage::PoseRecord& pose : *poses) {
+    ++counts.poses;
+    const double error_V = bench.error_V(pose);
+    if (error_V < kWrong_V) continue;
+    ++counts.wrong;
+    complain(fmt::format("pose {} is {:.3f} mV off the truth", pose.ordinal, 1e3 * error_V));
+  }
+}
+
+/// Requests of a run of this plan are about this many (start-up, homing, polls of every wait).
+constexpr int kRequests = 1500;
+
+Case modbus_case(int index, std::mt19937_64& random) {
+  struct Kind {
+    const char* name;
+    const char* rest;
+  };
+  static constexpr std::array kKinds = {Kind{"modbus.exception", "code = 1"},
+                                        Kind{"modbus.exception", "code = 2"},
+                                        Kind{"modbus.exception", "code = 3"},
+                                        Kind{"modbus.exception", "code = 4"},
+                                        Kind{"modbus.exception", "code = 5"},
+                                        Kind{"modbus.exception", "code = 6"},
+                                        Kind{"modbus.silence", "count = 3"},
+                                        Kind{"modbus.late", "late_s = 0.25"},
+                                        Kind{"modbus.truncated", "bytes = 5"},
+                                        Kind{"modbus.bad_crc", ""},
+                                        Kind{"modbus.wrong_unit", ""},
+                                        Kind{"modbus.wrong_transaction", ""},
+                                        Kind{"modbus.reset", ""},
+                                        Kind{"modbus.half_open", ""}};
+  const Kind& kind = kKinds[static_cast<std::size_t>(index) % kKinds.size()];
+  // Before, between and after the motions: idle, homing, moving, settling, sampling.
+  const int after = std::uniform_int_distribution<int>(0, kRequests)(random);
+  Case one;
+  one.name = fmt::format("{} {} after {}", kind.name, kind.rest, after);
+  one.world = fault(kind.name, fmt::format("{}\nafter = {}", kind.rest, after));
+  one.plan = "";
+  // At the very start a person is at the rig: a fault there may end the run.
+  one.may_fail = after < 60;
+  return one;
+}
+
+Case swapped_words() {
+  Case one;
+  one.name = "word order swapped";
+  one.world = "\n[drive]\nword_order = \"low_first\"\n";
+  one.may_fail = true;  // must: positions make no sense
+  return one;
+}
+
+Case drive_case(int index, std::mt19937_64& random) {
+  const int move = std::uniform_int_distribution<int>(0, 12)(random);
+  const double delay_s = std::uniform_real_distribution<double>(0, 3)(random);
+  const char* axis = std::uniform_int_distribution<int>(0, 1)(random) == 0 ? "delta" : "h";
+  static constexpr std::array kKinds = {"drive.stall",       "drive.alarm", "drive.limit",
+                                        "drive.lost_homing", "drive.alarm", "drive.slip"};
+  const std::string kind = kKinds[static_cast<std::size_t>(index) % kKinds.size()];
+  const std::string code = index % kKinds.size() == 4 ? "code = 0x84\n" : "";  // the watchdog's
+  Case one;
+  one.name = fmt::format("{} {} move {} delay {:.2f}", kind, axis, move, delay_s);
+  one.world = fault(kind, fmt::format("{}axis = \"{}\"\nmove = {}\ndelay_s = {:.3f}{}", code, axis,
+                                      move, delay_s, kind == "drive.slip" ? "\nslip_deg = 8" : ""));
+  if (kind == "drive.slip") {
+    // No encoder sees a slip; what finds it is the homing that the lost one asks for.
+    one.world += fault("drive.lost_homing",
+                       fmt::format("axis = \"{}\"\nmove = {}", axis, std::min(move + 3, 12)));
+  }
+  return one;
+}
+
+Case can_case(int index, std::mt19937_64& random) {
+  const int move = std::uniform_int_distribution<int>(0, 12)(random);
+  const double delay_s = std::uniform_real_distribution<double>(0, 3)(random);
+  const double share =
+      std::exp(std::uniform_real_distribution<double>(std::log(0.001), std::log(0.2))(random));
+  const char* axis =
+      std::array{"x", "y", "z"}[std::uniform_int_distribution<std::size_t>(0, 2)(random)];
+  const std::string trigger = fmt::format("move = {}\ndelay_s = {:.3f}\n", move, delay_s);
+  Case one;
+  switch (index % 7) {
+    case 0:
+      one.name = fmt::format("loss of {:.2f} %", 100 * share);
+      one.world = fault("can.loss", fmt::format("probability = {:.5f}", share));
+      one.may_fail = share > 0.03;  // 20 consecutive samples are then rare
+      break;
+    case 1:
+      one.name = fmt::format("reordering of {:.2f} %", 100 * share);
+      one.world = fault("can.reorder", fmt::format("probability = {:.5f}", share));
+      one.may_fail = share > 0.03;
+      break;
+    case 2:
+      one.name = fmt::format("duplicates of {:.2f} %", 100 * share);
+      one.world = fault("can.duplicate", fmt::format("probability = {:.5f}", share));
+      break;
+    case 3:
+      one.name = fmt::format("bus-off at move {}", move);
+      one.world = fault("can.error_frame", "error_class = 0x40\n" + trigger) +
+                  fault("can.silence", trigger + "duration_s = 2");
+      break;
+    case 4:
+      one.name = fmt::format("{} stuck at move {}", axis, move);
+      one.world =
+          fault("can.stuck_code", trigger + fmt::format("axis = \"{}\"\nduration_s = 6", axis));
+      break;
+    case 5:
+      one.name = fmt::format("{} saturated at move {}", axis, move);
+      one.world =
+          fault("can.saturation", trigger + fmt::format("axis = \"{}\"\nduration_s = 3", axis));
+      break;
+    default:
+      one.name = fmt::format("10 s of silence at move {}", move);
+      one.world = fault("can.silence", trigger + "duration_s = 10");
+  }
+  return one;
+}
+
+}  // namespace
+}  // namespace plumbline::battery
+
+int main(int argc, char** argv) {
+  using namespace plumbline::battery;
+  CLI::App app{"faults of the wires and of the drive at many moments"};
+  app.require_subcommand(1);
+  int count = 50;
+  double speed = 60;
+  bool rtu = false;
+  std::uint64_t seed = 1;
+  CLI::App* modbus = app.add_subcommand("modbus");
+  CLI::App* drive = app.add_subcommand("drive");
+  CLI::App* can = app.add_subcommand("can");
+  modbus->add_flag("--rtu", rtu, "on a serial line");
+  for (CLI::App* sub : {modbus, drive, can}) {
+    sub->add_option("--count", count);
+    sub->add_option("--speed", speed);
+    sub->add_option("--seed", seed);
+  }
+  CLI11_PARSE(app, argc, argv);
+  std::mt19937_64 random(seed);
+  Counts counts;
+  for (int i = 0; i < count; ++i) {
+    const Case one = modbus->parsed()
+                         ? (i % 15 == 14 ? swapped_words() : modbus_case(i % 15, random))
+                     : drive->parsed() ? drive_case(i, random)
+                                       : can_case(i, random);
+    run_case(one, speed, rtu, seed + static_cast<std::uint64_t>(i), counts);
+    if ((i + 1) % 10 == 0) fmt::print("battery-wire: {} runs\n", i + 1);
+    std::fflush(stdout);
+  }
+  fmt::print(
+      "battery-wire {}: {} runs, {} finished, {} ended safely, {} poses accepted, {} of them "
+      "wrong, {} faults\n",
+      app.get_subcommands().front()->get_name(), counts.runs, counts.finished, counts.ended_safely,
+      counts.poses, counts.wrong, counts.faults);
+  return counts.faults == 0 ? 0 : 1;
+}
