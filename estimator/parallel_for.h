@@ -7,6 +7,8 @@
 #include <thread>
 #include <vector>
 
+#include "estimator/linear_algebra.h"
+
 namespace plumbline {
 
 /// As long as one lives, parallel_for() of its thread starts no others: for programs that work on
@@ -35,8 +37,9 @@ void parallel_for(std::size_t count, const Work& work) {
   const auto run = [&] {
     for (std::size_t i = next++; i < count; i = next++) work(i);
   };
-  const std::size_t cores =
-      SerialScope::active() ? 1 : std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t cores = SerialScope::active() || !linear_algebra_is_thread_safe()
+                                ? 1
+                                : std::max(1U, std::thread::hardware_concurrency());
   std::vector<std::jthread> helpers;
   for (std::size_t i = 1; i < std::min(count, cores); ++i) helpers.emplace_back(run);
   run();

@@ -56,6 +56,16 @@ double largest_change(const VisitLog& log, const ActiveEffect& active) {
   return largest;
 }
 
+// Means, then contrasts of the dwells, as the Jacobian has them.
+Eigen::VectorXd stacked_prediction(const VisitLog& log, const EnlargedParameters& parameters) {
+  const auto mean_V = predict_means_V(log, parameters);
+  const auto dwell_V = predict_dwells_V(log, parameters);
+  Eigen::VectorXd all(stacked_rows(log));
+  all << mean_V[0], mean_V[1], mean_V[2], dwell_V[0].reshaped(), dwell_V[1].reshaped(),
+      dwell_V[2].reshaped();
+  return all;
+}
+
 struct EveryEffect : testing::Test {
   VisitLog log = example_log();
   std::vector<std::unique_ptr<Effect>> columns = covariate_effects(log);
@@ -119,9 +129,9 @@ TEST_F(EveryEffect, JacobianAgreesWithTheChangeThatAStepMakes) {
       if (infos[k].role == ParameterRole::amplitude) {
         EnlargedParameters doubled = model;
         doubled.effects[0].p[k] *= 2;
-        const auto from = predict_means_V(log, model), to = predict_means_V(log, doubled);
-        Eigen::VectorXd change(jacobian.rows());
-        change << to[0] - from[0], to[1] - from[1], to[2] - from[2];
+        const Eigen::VectorXd change =
+            stacked_prediction(log, doubled) - stacked_prediction(log, model);
+        ASSERT_EQ(change.size(), jacobian.rows());
         const Eigen::VectorXd expected = model.effects[0].p[k] * jacobian.col(column);
         EXPECT_LT((change - expected).norm(), 0.02 * expected.norm() + 1e-12)
             << effect->id() << " " << infos[k].name;

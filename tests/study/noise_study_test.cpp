@@ -11,7 +11,7 @@ TEST(NoiseStudy, AbsentTermsStayAbsentAndIntervalsHold) {
   const NoiseCase white{.name = "white", .truth = {.N = 1e-3}, .samples = 8000};
   const NoiseStudy study = study_noise(white, kRecords, 500);
   EXPECT_GE(study.term[kTermN].covered, 0.85);
-  EXPECT_EQ(study.term[kTermN].present, 1);
+  EXPECT_GE(study.term[kTermN].present, 0.999);
   for (const std::size_t absent : {kTermQ, kTermB, kTermK, kTermR})
     EXPECT_LE(study.term[absent].present, 0.1) << kTermName[absent];
   EXPECT_LE(study.lines, 0.05);

@@ -92,7 +92,7 @@ INIT
 chmod +x "$root/init"
 (cd "$root" && find . -print0 | cpio --null --quiet -o -H newc | gzip -1) >"$root.cpio.gz"
 
-timeout "$timeout_s" qemu-system-x86_64 -M q35 -m 1024 -smp 2 -nographic -no-reboot -nodefaults \
+timeout "$timeout_s" qemu-system-x86_64 -M q35 -cpu max -m 1024 -smp 2 -nographic -no-reboot -nodefaults \
   -serial stdio -kernel "$vmlinuz" -initrd "$root.cpio.gz" \
   -append "console=ttyS0 quiet panic=-1" </dev/null 2>&1 | tr -d '\r' >"$root.console" || true
 if ! grep -q '^VM-BEGIN' "$root.console"; then
