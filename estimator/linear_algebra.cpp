@@ -2,6 +2,11 @@
 
 #include <cblas.h>
 
+#include <cassert>
+
+// OpenBLAS holds LAPACK, too; its header is a package of its own.
+extern "C" void dpotri_(const char* triangle, const int* n, double* a, const int* lda, int* info);
+
 namespace plumbline {
 namespace {
 
@@ -15,5 +20,14 @@ const bool kThreadSafe = [] {
 }  // namespace
 
 bool linear_algebra_is_thread_safe() { return kThreadSafe; }
+
+Eigen::MatrixXd inverse_from_factor(Eigen::MatrixXd lower) {
+  const int n = static_cast<int>(lower.rows());
+  int info = 0;
+  dpotri_("L", &n, lower.data(), &n, &info);
+  assert(info == 0);
+  lower.triangularView<Eigen::StrictlyUpper>() = lower.transpose();
+  return lower;
+}
 
 }  // namespace plumbline

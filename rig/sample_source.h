@@ -37,7 +37,8 @@ struct SourceStatistics {
 };
 
 /// What one call delivered. Everything that had been on its way at `empty_at` is in this or an
-/// earlier batch: nothing was waiting to be read at that time, or a moment later. `ended` is true when a recorded log has been read to its end.
+/// earlier batch: nothing was waiting to be read at that time, or a moment later. `ended` is true
+/// when a recorded log has been read to its end.
 struct SampleBatch {
   std::vector<RawSample> samples;
   std::vector<CovariateReading> covariates;

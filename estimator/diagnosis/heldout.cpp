@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <limits>
 
+#include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -10,12 +11,8 @@ namespace plumbline {
 Heldout::Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
                  const PoseWhitening& whitening)
     : log_(log), mean_V_(mean_V) {
-  parallel_for(kAxisCount, [&](std::size_t i) {
-    const Eigen::Index n = mean_V[i].size();
-    const Eigen::MatrixXd half =
-        whitening.lower[i].triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(n, n));
-    inverse_[i] = half.transpose() * half;
-  });
+  parallel_for(kAxisCount,
+               [&](std::size_t i) { inverse_[i] = inverse_from_factor(whitening.lower[i]); });
 }
 
 std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(

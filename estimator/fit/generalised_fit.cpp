@@ -10,6 +10,7 @@
 
 #include "estimator/fit/least_squares.h"
 #include "estimator/kinematics.h"
+#include "estimator/linear_algebra.h"
 
 namespace plumbline {
 namespace {
@@ -123,7 +124,7 @@ Eigen::VectorXd heldout_residuals_V(const Eigen::MatrixXd& A, const Eigen::Vecto
 
   // Z = V⁻¹ − V⁻¹·A·C·Aᵀ·V⁻¹; a block's free parameters are d = Z_BB⁻¹·(Z·y)_B, and the fit to the
   // rest is x − gain_B·d.
-  const Eigen::MatrixXd V_inverse = cholesky.solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd V_inverse = inverse_from_factor(cholesky.matrixLLT());
   const std::optional<GeneralisedFit> fit = fit_generalised(A, y, V);
   if (!fit) return residuals;
   const Eigen::MatrixXd V_inverse_A = V_inverse * A;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/linear_algebra.h"
 #include "estimator/noise/covariance.h"
 
 namespace plumbline {
@@ -65,8 +66,7 @@ bool is_coarse_against(const Adc& adc, double sample_sd_V) {
 Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
                                      const Eigen::VectorXd& residual) {
   const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
-  const Eigen::MatrixXd inverse =
-      cholesky.solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
+  const Eigen::MatrixXd inverse = inverse_from_factor(cholesky.matrixLLT());
   return residual - (inverse * residual).cwiseQuotient(inverse.diagonal());
 }
 

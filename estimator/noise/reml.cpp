@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/linear_algebra.h"
 #include "estimator/noise/nonnegative.h"
 
 namespace plumbline {
@@ -59,11 +60,10 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
 Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design) {
   const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
   assert(cholesky.info() == Eigen::Success);
-  const Eigen::Index n = covariance.rows();
   const Eigen::MatrixXd white_design = cholesky.matrixL().solve(design);
   const Eigen::LLT<Eigen::MatrixXd> normal(white_design.transpose() * white_design);
   Projector result;
-  const Eigen::MatrixXd inverse = cholesky.solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd inverse = inverse_from_factor(cholesky.matrixLLT());
   const Eigen::MatrixXd weighted = inverse * design;
   result.P = inverse - weighted * normal.solve(weighted.transpose());
   result.log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum() +
@@ -194,17 +194,21 @@ Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise,
                                           const Eigen::MatrixXd& design) const {
   const Eigen::Index count = processes_->count();
   const Eigen::MatrixXd P = make_projector(noise.covariance, design).P;
-  std::vector<Eigen::MatrixXd> seen;
-  for (const Eigen::MatrixXd& unit : processes_->unit) seen.push_back(P * unit);
   Point point{noise.power, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
   add_record(noise.power, point);
+  // Of processes that were estimated at zero, the ones with names are asked for all the same.
+  std::vector<Eigen::Index> wanted;
+  std::vector<Eigen::MatrixXd> seen;
   for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      const double value = seen[static_cast<std::size_t>(i)]
-                               .cwiseProduct(seen[static_cast<std::size_t>(j)].transpose())
-                               .sum();
-      point.normal(i, j) += value;
-      if (i != j) point.normal(j, i) += value;
+    if (!(noise.power(i) > 0) && (i == kTermQ || i >= NoiseProcesses::kFirstMarkov)) continue;
+    wanted.push_back(i);
+    seen.push_back(P * processes_->unit[static_cast<std::size_t>(i)]);
+  }
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double value = seen[i].cwiseProduct(seen[j].transpose()).sum();
+      point.normal(wanted[i], wanted[j]) += value;
+      if (i != j) point.normal(wanted[j], wanted[i]) += value;
     }
   }
   return 0.5 * point.normal;

@@ -47,7 +47,8 @@ class NoisePool {
   /// mean: n; design: n×p of full rank, n > p. `start`: powers to begin with, or null.
   PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                    const Eigen::VectorXd* start = nullptr) const;
-  /// Expected information about the powers at `noise`, beside `design`.
+  /// Expected information about the powers at `noise`, beside `design`. That of the means is given
+  /// for N, B, K and for what is not zero.
   Eigen::MatrixXd information_of(const PooledNoise& noise, const Eigen::MatrixXd& design) const;
   /// Σ of the window means at given powers.
   Eigen::MatrixXd covariance(const Eigen::VectorXd& power) const;

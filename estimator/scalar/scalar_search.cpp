@@ -188,8 +188,9 @@ CandidateList scalar_candidates(const VisitLog& log) {
   for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
     // There is no head; its angles here are only another way to write the attitude. What happens
     // within a rest does not show in its mean.
-    if (term->form() == TermForm::sample || term->subject() == Subject::head || term->driver() == "delta_deg" ||
-        term->driver() == "h_deg" || term->driver().starts_with("code_")) {
+    if (term->form() == TermForm::sample || term->subject() == Subject::head ||
+        term->driver() == "delta_deg" || term->driver() == "h_deg" ||
+        term->driver().starts_with("code_")) {
       continue;
     }
     list.owned.push_back(std::move(term));
