@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "estimator/parallel_for.h"
+
 namespace plumbline {
 namespace {
 
@@ -233,30 +235,30 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
   const Eigen::VectorXd centre = parameters.free_values();
   const std::vector<double> steps = difference_steps(parameters);
   Eigen::MatrixXd jacobian(stacked_rows(log), centre.size());
-  EnlargedParameters moved = parameters;
-  for (Eigen::Index j = 0; j < centre.size(); ++j) {
-    const double step = steps[static_cast<std::size_t>(j)];
+  parallel_for(steps.size(), [&](std::size_t column) {
+    const auto j = static_cast<Eigen::Index>(column);
+    EnlargedParameters moved = parameters;
     Eigen::VectorXd values = centre;
-    values(j) = centre(j) + step;
+    values(j) = centre(j) + steps[column];
     moved.set_free_values(values);
     const Eigen::VectorXd above = predict_stacked(log, moved);
-    values(j) = centre(j) - step;
+    values(j) = centre(j) - steps[column];
     moved.set_free_values(values);
-    jacobian.col(j) = (above - predict_stacked(log, moved)) / (2 * step);
-  }
+    jacobian.col(j) = (above - predict_stacked(log, moved)) / (2 * steps[column]);
+  });
   return jacobian;
 }
 
 Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   Eigen::MatrixXd whitened = all;
   const Eigen::Index n = lower[0].rows();
-  for (Eigen::Index i = 0; i < kAxes; ++i) {
-    const auto axis = static_cast<std::size_t>(i);
+  parallel_for(kAxisCount, [&](std::size_t axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
     auto means = whitened.middleRows(i * n, n);
     lower[axis].triangularView<Eigen::Lower>().solveInPlace(means);
     for (Eigen::Index d = 0; d < kDwellContrasts; ++d)
       whitened.middleRows((kAxes + i * kDwellContrasts + d) * n, n) /= dwell_sd_V[axis](d);
-  }
+  });
   return whitened;
 }
 

@@ -98,7 +98,9 @@ TEST(Program, CalibratesASmallSet) {
                   5 * x["u_K_V_per_g"][at].get<double>());
     }
     EXPECT_NEAR(x["U0_V"].get<double>(), truth.parameters(axis, 3), 5 * x["u_U0_V"].get<double>());
-    EXPECT_LT(x["u_U0_V"].get<double>(), truth.noise_V / 10);
+    EXPECT_LT(x["u_K_V_per_g"][0].get<double>(), truth.noise_V / 10);
+    // 60 poses cannot exclude a slow process; it counts for the level.
+    EXPECT_LT(x["u_U0_V"].get<double>(), truth.noise_V / 3);
   }
   EXPECT_EQ(json["data"]["poses"], 60);
   EXPECT_EQ(json["data"]["samples"], 1200);
