@@ -113,8 +113,10 @@ TEST_F(SequencerRecovery, PosesMeasuredAfterASlipAreMeasuredAgain) {
 }
 
 TEST_F(SequencerRecovery, AConverterThatHangsAndOneThatIsOverdrivenAreNotBelieved) {
-  start_rig(fault("can.stuck_code", "axis = \"y\"\nmove = 5\nduration_s = 4") +
-            fault("can.saturation", "axis = \"x\"\nmove = 10\nduration_s = 4"));
+  // Each lasts far longer than the way to the pose, which a busy machine draws out.
+  rig_.recovery.attempts_per_pose = 12;
+  start_rig(fault("can.stuck_code", "axis = \"y\"\nmove = 4\nduration_s = 60") +
+            fault("can.saturation", "axis = \"x\"\nmove = 9\nduration_s = 60"));
   expect_finished(run());
   EXPECT_THAT(events("retry"), Contains(HasSubstr("the converter hangs")));
   EXPECT_THAT(events("retry"), Contains(HasSubstr("end of the converter's span")));
