@@ -23,6 +23,7 @@
 #include "estimator/noise/identify.h"
 #include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
+#include "estimator/quantization/quantized_axis.h"
 
 namespace plumbline {
 namespace {
@@ -54,6 +55,9 @@ struct AxisWork {
   Eigen::MatrixXd V;
   ResidualTestResult test;
   bool noise_known = false;
+  /// What the poses' codes are worth, where they are better than mean voltages: the estimators then
+  /// take these in place of y, the residuals stay those of the mean voltages.
+  std::optional<QuantizedAxis> quantized;
 };
 
 double squared(double value) { return value * value; }
@@ -109,6 +113,33 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
   return variance;
 }
 
+/// Estimates from the codes where rounding matters.
+void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
+  if (!experiment.input.description.adc) return;
+  auto quantized = quantized_axis(experiment.input.run, experiment.A, work.positioning_V2,
+                                  *experiment.input.description.adc, axis);
+  if (!quantized) return;
+  // Quantization and white noise are those of single readings: in the intervals already.
+  const Eigen::Index n = work.y.size();
+  Eigen::MatrixXd V = Eigen::MatrixXd::Zero(n, n);
+  for (std::size_t i = 0; i < experiment.processes.unit.size(); ++i) {
+    const double power = work.pooled.power(static_cast<Eigen::Index>(i));
+    if (i != kTermQ && i != kTermN && power > 0) V += power * experiment.processes.unit[i];
+  }
+  // The scatter found between the codes of different poses holds the slow noise once more.
+  const double twice_V2 = std::min(squared(quantized->use.scatter_V), V.diagonal().mean());
+  quantized->variance_V2 =
+      (quantized->variance_V2.array() - twice_V2).max(0.1 * quantized->variance_V2.array());
+  V.diagonal() += quantized->variance_V2;
+  const auto fit = fit_generalised(experiment.A, quantized->mean_V, V);
+  if (!fit) return;
+  work.fit.estimate = fit->estimate;
+  work.fit.whitened = fit->whitened;
+  work.fit.gain = fit->gain;
+  work.fit.residual_V = work.y - experiment.A * fit->estimate.value;
+  work.quantized = std::move(quantized);
+}
+
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
   AxisWork work;
   const Eigen::VectorXd mean_V = mean_voltages(experiment.poses, axis);
@@ -154,6 +185,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
     work.noise_known = known;
+    use_codes(experiment, axis, work);
     return work;
   }
   // Nothing is known about the noise: the residual has to say how large it is.
@@ -161,6 +193,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   const double variance_V2 = std::max(ordinary.residual_sum_of_squares / dof, 1e-24);
   work.V = Eigen::MatrixXd::Identity(n, n) * variance_V2;
   work.fit = *fit_generalised(experiment.A, work.y, work.V);
+  use_codes(experiment, axis, work);
   return work;
 }
 
@@ -183,8 +216,11 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
     convergence.rls[pose][axis] = with_gravity(recursive.estimate(), gravity, inflation);
 
     filter.predict(experiment.poses[pose].t_mean_s);
-    const double variance_V2 = work.noise_known ? white_V2(row) : work.V(row, row);
-    filter.update(experiment.A.row(row).head<3>(), work.y(row), variance_V2);
+    const double variance_V2 = work.quantized     ? work.quantized->variance_V2(row)
+                               : work.noise_known ? white_V2(row)
+                                                  : work.V(row, row);
+    filter.update(experiment.A.row(row).head<3>(),
+                  work.quantized ? work.quantized->mean_V(row) : work.y(row), variance_V2);
     convergence.ekf[pose][axis] = with_gravity(filter.parameters(), gravity, inflation);
 
     AxisEstimate batch{Eigen::Vector4d::Constant(kNan), Eigen::Matrix4d::Constant(kNan)};
@@ -237,6 +273,23 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
   return heldout;
 }
 
+UncertaintyReport uncertainty_of(const CalibrationInput& input, const PerAxis<AxisWork>& work,
+                                 std::uint64_t seed) {
+  PerAxis<PropagationAxis> axes;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const AxisWork& w = work[axis];
+    PropagationAxis& a = axes[axis];
+    a.value = w.fit.estimate.value;
+    a.gain = w.fit.gain;
+    // Rounding that was estimated from the codes is part of the noise there.
+    a.rounding_V2 = w.quantized ? Eigen::VectorXd(Eigen::VectorXd::Zero(w.y.size()))
+                                : Eigen::VectorXd(w.own_V2 - w.positioning_V2);
+    const Eigen::VectorXd own_V2 = a.rounding_V2 + w.positioning_V2;
+    a.noise = w.fit.estimate.covariance - a.gain * own_V2.asDiagonal() * a.gain.transpose();
+  }
+  return propagate_uncertainty({input.run.poses, input.description, axes}, seed);
+}
+
 }  // namespace
 
 Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& options) {
@@ -276,6 +329,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
   double u_worst_mps2 = 0;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const AxisWork& w = work[axis];
+    if (w.quantized) result.quantization[axis] = w.quantized->use;
     const double mps2_per_V = input_referred_mps2_per_V(w.fit.estimate, axis);
     result.diagnosis.axis_test[axis] = {w.test.chi2, w.test.dof, w.test.p_value};
 
@@ -339,6 +393,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
       u_worst_mps2 = worst->u_mps2;
     }
   }
+  result.uncertainty = uncertainty_of(input, work, options.seed);
   if (input.description.limits && worst_error_mps2 >= 0)
     result.decision =
         decide(input.description.limits->max_abs_error_mps2, worst_error_mps2, u_worst_mps2);

@@ -9,6 +9,7 @@
 
 #include "estimator/measurement.h"
 #include "estimator/noise/noise_model.h"
+#include "estimator/uncertainty/monte_carlo.h"
 
 namespace plumbline {
 
@@ -123,6 +124,13 @@ struct Observability {
       unobservable;  ///< names the direction when rank < 4, e.g. "K_z and U_0 (only a_z = 0 seen)"
 };
 
+/// Where converter steps are coarse against the noise, and the codes were used as intervals.
+struct QuantizationUse {
+  double step_V = 0;
+  double sigma_V = 0;    ///< noise of one reading before rounding, estimated
+  double scatter_V = 0;  ///< from pose to pose beyond positioning, estimated
+};
+
 struct CalibrationInput {
   const MeasurementSet& run;
   const SampleTable* static_record = nullptr;  ///< null: noise is taken from the bursts
@@ -141,14 +149,17 @@ struct Calibration {
   std::size_t samples = 0;
   std::size_t skipped_rows = 0;
   PerAxis<NoiseModel> noise;
-  ModelEstimates estimates;  ///< the paper's 12-parameter model
-  ModelEstimates final;      ///< re-estimated together with the effects; the certified model
+  PerAxis<std::optional<QuantizationUse>> quantization;  ///< nothing: steps do not matter
+  ModelEstimates estimates;                              ///< the paper's 12-parameter model
+  ModelEstimates final;  ///< re-estimated together with the effects; the certified model
   Convergence convergence;
   Diagnosis diagnosis;
   ErrorFigures before;
   ErrorFigures after;
   PerAxis<double> floor_pose_rms_mps2{};
   PerAxis<double> u_floor_pose_rms_mps2{};  ///< from the uncertainty of the noise terms
+  /// Of estimates.batch_ls, by the GUM and by its Supplement 1.
+  std::optional<UncertaintyReport> uncertainty;
   Decision decision;
   std::vector<PoseResult> pose_results;
 };

@@ -68,6 +68,56 @@ void add_ieee_terms(const Composer& c) {
       Tone::note});
 }
 
+/// Where the converter was coarse, that the codes were used, not their means.
+void add_quantization(const Composer& c) {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto& use = c.input.calibration.quantization[i];
+    if (!use) continue;
+    c.add(Paragraph{
+        c.tr("Output {}: the noise of a reading is {} of a step of the converter, too little to "
+             "smooth the steps. The parameters are estimated from the likelihood of the intervals "
+             "between the code boundaries, not from mean voltages.",
+             kAxisName[i], significant(use->sigma_V / use->step_V, 2))});
+  }
+}
+
+std::string word(const Composer& c, bool yes) { return yes ? c.tr("yes") : c.tr("no"); }
+
+/// Both intervals of every parameter and whether they agree (JCGM 101, clause 8).
+void add_monte_carlo(const Composer& c) {
+  const auto& report = c.input.calibration.uncertainty;
+  if (!report) return;
+  Table table;
+  table.caption = c.tr(
+      "Twelve parameters: 95 % intervals by the law of propagation (GUM) and by Monte Carlo "
+      "(JCGM 101), mV/g and mV");
+  table.header = {c.tr("parameter"),       "GUM",           "Monte Carlo", c.tr("u, GUM"),
+                  c.tr("u, Monte Carlo"), c.tr("tolerance"), c.tr("agree")};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      const ParameterUncertainty& p = report->parameter[i][j];
+      const double expanded = 1e3 * kCoverageFactor * p.budget.combined;
+      const auto interval = [&](double low, double high) {
+        return round_result(1e3 * low, expanded).value + " … " +
+               round_result(1e3 * high, expanded).value;
+      };
+      table.rows.push_back({parameter_name(i, static_cast<Eigen::Index>(j)),
+                            interval(p.gum_low, p.gum_high), interval(p.mc_low, p.mc_high),
+                            significant(1e3 * p.budget.combined, 2), significant(1e3 * p.mc_u, 2),
+                            significant(1e3 * p.tolerance, 1), word(c, p.validated)});
+    }
+  }
+  c.add(std::move(table));
+  c.add(Paragraph{
+      report->validated
+          ? c.tr("{} trials. The ends of all intervals agree within the tolerance of JCGM 101, "
+                 "clause 8: the law of propagation is validated.",
+                 report->trials)
+          : c.tr("{} trials. Not all intervals agree within the tolerance of JCGM 101, clause 8: "
+                 "where they do not, the Monte Carlo interval holds.",
+                 report->trials)});
+}
+
 void add_agreement(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
   Table table;
@@ -151,6 +201,7 @@ void add_parameters(const Composer& c) {
       "force a in the frame of the triad in units of g_n = 9.80665 m/s². Expanded uncertainties "
       "U with coverage factor k = 2 (about 95 %).")});
   add_matrix(c);
+  add_quantization(c);
   add_ieee_terms(c);
 }
 
@@ -174,9 +225,9 @@ void add_budget(const Composer& c) {
   c.add(Paragraph{
       c.tr("The scatter of the readings contains the identified noise, the rounding by the "
            "converter, the repeatability of the unit within the run, and what estimating the "
-           "added effects together with the parameters costs. A Monte Carlo propagation (JCGM "
-           "101) is not part of this certificate."),
+           "added effects together with the parameters costs."),
       Tone::note});
+  add_monte_carlo(c);
 }
 
 void add_estimators(const Composer& c) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "app/io/diagnosis_json.h"
+#include "app/io/uncertainty_json.h"
 
 namespace plumbline::app {
 
@@ -51,6 +52,22 @@ Json to_json(const NoiseModel& noise) {
 
 }  // namespace
 
+namespace {
+
+/// Per axis: null where the converter's steps do not matter.
+Json quantization_json(const Calibration& calibration) {
+  return json_per_axis([&](std::size_t axis) -> Json {
+    const auto& use = calibration.quantization[axis];
+    if (!use) return nullptr;
+    return {{"method", "interval likelihood"},
+            {"step_V", json_number(use->step_V)},
+            {"sigma_V", json_number(use->sigma_V)},
+            {"scatter_V", json_number(use->scatter_V)}};
+  });
+}
+
+}  // namespace
+
 Json result_json(const Calibration& calibration, const Provenance& provenance) {
   assert(calibration.observability.rank == 4);
   return {{"schema", "plumbline.result/1"},
@@ -66,7 +83,10 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
            })},
           {"noise_fit",
            json_per_axis([&](std::size_t axis) { return to_json(calibration.noise[axis]); })},
+          {"quantization", quantization_json(calibration)},
           {"estimates", to_json(calibration.estimates)},
+          {"uncertainty",
+           calibration.uncertainty ? uncertainty_json(*calibration.uncertainty) : Json(nullptr)},
           {"diagnosis", json_diagnosis(calibration.diagnosis)},
           {"final", to_json(calibration.final)},
           {"error",

@@ -1,0 +1,295 @@
+#include "estimator/quantization/interval_fit.h"
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+namespace plumbline {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double normal_below(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+
+/// log P(low < z < high) of the standard normal distribution, also far out in the tails.
+double log_between(double low, double high) {
+  if (low > 0) {
+    std::swap(low, high);
+    low = -low;
+    high = -high;
+  }
+  const double inside = normal_below(high) - normal_below(low);
+  if (inside > 1e-290) return std::log(inside);
+  // Mills' ratio.
+  return -0.5 * high * high - std::log(-high) - 0.918938533204672742;
+}
+
+/// log-likelihood of a pose's codes when its true output is u.
+double log_likelihood(const CodeCounts& codes, double u, double sigma) {
+  double sum = 0;
+  for (std::size_t i = 0; i < codes.count.size(); ++i) {
+    const auto& [code, count] = codes.count[i];
+    const double low = codes.at_low_end && i == 0 ? -kInfinity : (code - 0.5 - u) / sigma;
+    const double high =
+        codes.at_high_end && i + 1 == codes.count.size() ? kInfinity : (code + 0.5 - u) / sigma;
+    sum += count * log_between(low, high);
+  }
+  return sum;
+}
+
+/// Zeroth (log), first and second central moment of N(u; mean, variance) × likelihood.
+struct Moments {
+  double log_mass = 0;
+  double mean = 0;
+  double variance = 0;
+};
+
+Moments moments_of(const CodeCounts& codes, double sigma, double mean, double variance) {
+  constexpr int kPoints = 32;
+  constexpr double kWidth = 6;        // standard deviations
+  constexpr double kNegligible = 18;  // in log
+  const double sd = std::sqrt(variance);
+  // Where both factors can be felt: within the Gaussian, and near the codes that were seen.
+  const double reach = kWidth * sigma;
+  double low =
+      std::max(mean - kWidth * sd, std::min(codes.count.front().first - 0.5 - reach, mean));
+  double high =
+      std::min(mean + kWidth * sd, std::max(codes.count.back().first + 0.5 + reach, mean));
+  std::array<double, kPoints + 1> log_density{};
+  double top = -kInfinity;
+  for (int zoom = 0; zoom < 6; ++zoom) {
+    const double step = (high - low) / kPoints;
+    top = -kInfinity;
+    for (int i = 0; i <= kPoints; ++i) {
+      const double u = low + step * i;
+      const double z = (u - mean) / sd;
+      double& value = log_density[static_cast<std::size_t>(i)];
+      value = -0.5 * z * z + log_likelihood(codes, u, sigma);
+      top = std::max(top, value);
+    }
+    int first = 0, last = kPoints;
+    while (first < last && log_density[static_cast<std::size_t>(first)] < top - kNegligible)
+      ++first;
+    while (last > first && log_density[static_cast<std::size_t>(last)] < top - kNegligible) --last;
+    if (last - first > kPoints / 3) break;
+    high = low + step * std::min(kPoints, last + 1);
+    low = low + step * std::max(0, first - 1);
+  }
+  const double step = (high - low) / kPoints;
+  double mass = 0, first_moment = 0, second_moment = 0;
+  for (int i = 0; i <= kPoints; ++i) {
+    const double end = i == 0 || i == kPoints ? 0.5 : 1;
+    const double weight = end * std::exp(log_density[static_cast<std::size_t>(i)] - top);
+    const double d = low + step * i - mean;
+    mass += weight;
+    first_moment += weight * d;
+    second_moment += weight * d * d;
+  }
+  const double shift = first_moment / mass;
+  return {top + std::log(mass * step / (sd * std::sqrt(2 * std::numbers::pi))), mean + shift,
+          std::max(second_moment / mass - shift * shift, 1e-12 * variance)};
+}
+
+/// Expectation propagation at given sigma and scatter.
+class Propagation {
+ public:
+  Propagation(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
+              const Eigen::VectorXd& known_variance)
+      : A_(A), codes_(codes), known_(known_variance) {
+    mean_.resize(A.rows());
+    for (Eigen::Index k = 0; k < A.rows(); ++k) mean_(k) = codes[static_cast<std::size_t>(k)].mean;
+    reset();
+  }
+
+  void reset() {
+    precision_ = (known_.array() + 1.0 / 12).inverse();
+    shift_ = precision_.cwiseProduct(mean_);
+  }
+
+  /// Evidence (log, but for a constant). Starts from the sites as they are.
+  double run(double sigma, double scatter, int most_sweeps) {
+    double evidence = -kInfinity;
+    converged = false;
+    for (int sweep = 0; sweep < most_sweeps && !converged; ++sweep) {
+      const double last = evidence;
+      evidence = sweep_once(sigma, scatter * scatter, sweep == 0 ? 1.0 : 0.8);
+      converged = std::abs(evidence - last) < 2e-3;
+    }
+    return evidence;
+  }
+
+  void solve() {
+    const Eigen::MatrixXd weighted = precision_.asDiagonal() * A_;
+    covariance = Eigen::Matrix4d(A_.transpose() * weighted).inverse();
+    value = covariance * (A_.transpose() * shift_);
+  }
+
+  Eigen::VectorXd equivalent_variance() const { return precision_.cwiseInverse(); }
+  Eigen::VectorXd equivalent_mean() const { return shift_.cwiseQuotient(precision_); }
+
+  Eigen::Vector4d value;
+  Eigen::Matrix4d covariance;
+  bool converged = false;
+
+ private:
+  double sweep_once(double sigma, double scatter2, double damping) {
+    solve();
+    double evidence = 0.5 * std::log(covariance.determinant());
+    for (Eigen::Index k = 0; k < A_.rows(); ++k) {
+      const Eigen::Vector4d row = A_.row(k).transpose();
+      const double variance = row.dot(covariance * row), mean = row.dot(value);
+      const double free = 1 / variance - precision_(k);
+      if (!(free > 1e-9 / variance)) continue;  // this pose alone determines a direction
+      const double cavity_variance = 1 / free;
+      const double cavity_mean = cavity_variance * (mean / variance - shift_(k));
+      const double total = cavity_variance + known_(k) + scatter2;
+      const Moments tilted =
+          moments_of(codes_[static_cast<std::size_t>(k)], sigma, cavity_mean, total);
+      // The old site as it stands in the evidence …
+      const double old_variance = 1 / precision_(k), old_mean = shift_(k) / precision_(k);
+      const double spread = cavity_variance + old_variance;
+      const double from_fit = old_mean - mean, from_cavity = old_mean - cavity_mean;
+      evidence += tilted.log_mass + 0.5 * std::log(spread) +
+                  0.5 * from_cavity * from_cavity / spread + 0.5 * std::log(precision_(k)) -
+                  0.5 * precision_(k) * from_fit * from_fit;
+      // … and the new one: derivatives of the log mass by the mean.
+      const double slope = (tilted.mean - cavity_mean) / total;
+      const double curvature = (1 - tilted.variance / total) / total;
+      const double rest = 1 - curvature * cavity_variance;
+      const double precision = std::max(curvature / std::max(rest, 1e-6), 1e-6);
+      const double shift = curvature > 1e-9 ? precision * (cavity_mean + slope / curvature)
+                                            : slope + precision * cavity_mean;
+      precision_(k) += damping * (precision - precision_(k));
+      shift_(k) += damping * (shift - shift_(k));
+    }
+    return evidence;
+  }
+
+  const Eigen::MatrixXd& A_;
+  const std::vector<CodeCounts>& codes_;
+  const Eigen::VectorXd& known_;
+  Eigen::VectorXd mean_;
+  Eigen::VectorXd precision_;  ///< of the sites
+  Eigen::VectorXd shift_;      ///< precision × mean of the sites
+};
+
+struct Scales {
+  double sigma = 0.1;
+  double scatter = 0.003;
+};
+
+/// From the scatter inside the poses and, with single readings, from the residual.
+Scales first_guess(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes) {
+  double square = 0, dof = 0;
+  Eigen::VectorXd mean(A.rows());
+  for (Eigen::Index k = 0; k < A.rows(); ++k) {
+    const CodeCounts& pose = codes[static_cast<std::size_t>(k)];
+    mean(k) = pose.mean;
+    double readings = 0;
+    for (const auto& [code, count] : pose.count) {
+      square += count * (code - pose.mean) * (code - pose.mean);
+      readings += count;
+    }
+    dof += readings - 1;
+  }
+  Scales scales;
+  if (dof > 0) {
+    const double variance = square / dof;
+    // Readings that flip between two codes now and then come from less noise than they show.
+    scales.sigma = std::clamp(std::sqrt(std::max(variance - 1.0 / 12, 0.25 * variance)), 0.01, 3.0);
+  } else {
+    const Eigen::VectorXd residual = mean - A * A.colPivHouseholderQr().solve(mean);
+    const double variance = residual.squaredNorm() / static_cast<double>(A.rows() - 4) - 1.0 / 12;
+    scales.sigma = std::clamp(std::sqrt(std::max(variance, 0.0)), 0.05, 3.0);
+  }
+  return scales;
+}
+
+}  // namespace
+
+std::optional<std::vector<CodeCounts>> count_codes(const SampleTable& samples,
+                                                   const std::vector<Pose>& poses, std::size_t axis,
+                                                   const Adc& adc) {
+  constexpr double kOffGrid = 0.02;
+  const double middle_V = 0.5 * (adc.min_V + adc.max_V), step_V = adc.lsb_V();
+  const double half_range = std::ldexp(1.0, adc.bits - 1);
+  std::vector<CodeCounts> all;
+  all.reserve(poses.size());
+  for (const Pose& pose : poses) {
+    std::map<double, double> count;
+    CodeCounts codes;
+    for (std::size_t row = pose.first; row < pose.first + pose.count; ++row) {
+      const double exact = (samples.u_V[axis][row] - middle_V) / step_V;
+      const double code = std::round(exact);
+      if (!(std::abs(exact - code) < kOffGrid)) return std::nullopt;
+      count[code] += 1;
+      codes.mean += code / static_cast<double>(pose.count);
+    }
+    codes.count.assign(count.begin(), count.end());
+    codes.at_low_end = codes.count.front().first <= -half_range;
+    codes.at_high_end = codes.count.back().first >= half_range - 1;
+    all.push_back(std::move(codes));
+  }
+  return all;
+}
+
+IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
+                          const Eigen::VectorXd& known_variance) {
+  constexpr int kSearchSweeps = 6, kFinalSweeps = 40, kMostEvaluations = 48;
+  constexpr double kLeastSigma = 0.002, kLeastScatter = 0.0003, kMost = 5;
+  const Scales guess = first_guess(A, codes);
+  const bool single = std::all_of(codes.begin(), codes.end(), [](const CodeCounts& pose) {
+    return pose.count.size() == 1 && pose.count.front().second < 2;
+  });
+
+  // Pattern search over both logarithms; with single readings they cannot be told apart.
+  Propagation search(A, codes, known_variance);
+  std::array<double, 2> at = {std::log(guess.sigma),
+                              std::log(single ? kLeastScatter : guess.scatter)};
+  const auto evidence_of = [&](const std::array<double, 2>& x) {
+    return search.run(std::exp(x[0]), std::exp(x[1]), kSearchSweeps);
+  };
+  double best = evidence_of(at);
+  int evaluations = 1;
+  for (double step = 0.8; step > 0.1 && evaluations < kMostEvaluations;) {
+    bool better = false;
+    for (std::size_t d = 0; d < (single ? 1U : 2U); ++d) {
+      for (const double sign : {-1.0, 1.0}) {
+        std::array<double, 2> next = at;
+        next[d] += sign * step;
+        if (next[0] < std::log(kLeastSigma) || next[1] < std::log(kLeastScatter) ||
+            std::max(next[0], next[1]) > std::log(kMost)) {
+          continue;
+        }
+        const double evidence = evidence_of(next);
+        ++evaluations;
+        if (!(evidence > best + 1e-3)) continue;
+        best = evidence;
+        at = next;
+        better = true;
+        break;
+      }
+    }
+    if (!better) step /= 2;
+  }
+
+  IntervalFit fit;
+  fit.sigma = std::exp(at[0]);
+  fit.scatter = std::exp(at[1]);
+  search.reset();
+  search.run(fit.sigma, fit.scatter, kFinalSweeps);
+  search.solve();
+  fit.converged = search.converged && search.value.allFinite() && search.covariance.allFinite();
+  fit.value = search.value;
+  fit.covariance = search.covariance;
+  fit.equivalent_mean = search.equivalent_mean();
+  fit.equivalent_variance = search.equivalent_variance();
+  return fit;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,25 @@
+// Decides whether rounding matters on one axis of a run and, if so, what its codes are worth.
+#pragma once
+
+#include <optional>
+
+#include "estimator/calibrate.h"
+#include "estimator/quantization/interval_fit.h"
+
+namespace plumbline {
+
+/// The poses of one axis as measurements with Gaussian error, V.
+struct QuantizedAxis {
+  Eigen::VectorXd mean_V;       ///< n
+  Eigen::VectorXd variance_V2;  ///< n, positioning and noise included
+  QuantizationUse use;
+};
+
+/// Nothing when the noise is large enough to smooth the steps (readings scatter by more than 0.9
+/// steps: least squares is then as good), when the voltages are no codes, when there are fewer than
+/// 12 poses or when the estimation does not converge. A: n × 4; positioning_V2: n.
+std::optional<QuantizedAxis> quantized_axis(const MeasurementSet& run, const Eigen::MatrixXd& A,
+                                            const Eigen::VectorXd& positioning_V2, const Adc& adc,
+                                            std::size_t axis);
+
+}  // namespace plumbline
