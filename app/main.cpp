@@ -57,6 +57,7 @@ int run(int argc, char** argv) {
 
   Invocation invocation;
   add_calibrate(program, invocation);
+  add_correct(program, invocation);
   add_evaluate(program, invocation);
   add_noise(program, invocation);
   add_run(program, invocation);

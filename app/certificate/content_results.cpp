@@ -91,8 +91,9 @@ void add_monte_carlo(const Composer& c) {
   table.caption = c.tr(
       "Twelve parameters: 95 % intervals by the law of propagation (GUM) and by Monte Carlo "
       "(JCGM 101), mV/g and mV");
-  table.header = {c.tr("parameter"),       "GUM",           "Monte Carlo", c.tr("u, GUM"),
-                  c.tr("u, Monte Carlo"), c.tr("tolerance"), c.tr("agree")};
+  table.header = {
+      c.tr("parameter"), "GUM",        "Monte Carlo", c.tr("u, GUM"), c.tr("u, Monte Carlo"),
+      c.tr("tolerance"), c.tr("agree")};
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
       const ParameterUncertainty& p = report->parameter[i][j];

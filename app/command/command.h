@@ -20,6 +20,7 @@ struct Invocation {
 };
 
 void add_calibrate(CLI::App& program, Invocation& invocation);
+void add_correct(CLI::App& program, Invocation& invocation);
 void add_evaluate(CLI::App& program, Invocation& invocation);
 void add_noise(CLI::App& program, Invocation& invocation);
 void add_run(CLI::App& program, Invocation& invocation);

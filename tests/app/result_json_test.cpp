@@ -97,7 +97,8 @@ TEST(ResultJson, KeepsTheWrittenOrderAndShape) {
   std::vector<std::string> keys;
   for (const auto& item : json.items()) keys.push_back(item.key());
   EXPECT_THAT(keys, testing::ElementsAre("schema", "provenance", "data", "noise", "noise_fit",
-                                         "estimates", "diagnosis", "final", "error", "decision"));
+                                         "quantization", "estimates", "uncertainty", "diagnosis",
+                                         "final", "error", "decision"));
   const Json& x = json["estimates"]["batch_ls"]["x"];
   EXPECT_EQ(x["K_V_per_g"].dump(), "[0.032,0.2,0.3]");
   EXPECT_EQ(x["U0_V"].dump(), "-2.5");

@@ -1,0 +1,115 @@
+#include "estimator/correct.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "estimator/diagnosis/explain.h"
+
+namespace plumbline {
+namespace {
+
+/// What came before a reading is not in the file: between two readings the triad may have been
+/// anywhere.
+bool needs_history(const std::string& id) {
+  return id == "sensor.hysteresis" || id == "sensor.settling" ||
+         id.find("previous_pose") != std::string::npos;
+}
+
+bool can_be_computed(const ActiveEffect& active) {
+  const std::string id = active.effect->id();
+  return active.effect->subject() == Subject::sensor && !needs_history(id) &&
+         id != "env.base_field" && id != "adc.quantization" && id != "adc.mains_pickup";
+}
+
+/// Every reading as a visit of its own, at the angles under which a head would show its specific
+/// force, so that effects can be evaluated.
+MeasurementSet as_visits(const SampleTable& readings, const std::vector<Eigen::Vector3d>& a_g) {
+  constexpr double kDegPerRad = 180 / std::numbers::pi;
+  MeasurementSet set;
+  set.samples = readings;
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const Eigen::Vector3d up = a_g[k].normalized();
+    set.poses.push_back({static_cast<long long>(k), kDegPerRad * std::atan2(-up.y(), up.x()),
+                         kDegPerRad * std::asin(std::clamp(up.z(), -1.0, 1.0)), k, 1});
+  }
+  return set;
+}
+
+void add_name(std::vector<std::string>& names, const std::string& name) {
+  if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+}
+
+}  // namespace
+
+Corrected correct_readings(const CertifiedModel& model, const SampleTable& readings,
+                           const RunDescription& description) {
+  assert(readings.size() > 0);
+  constexpr int kRepetitions = 6;
+  Eigen::Matrix3d K_V_per_g;
+  Eigen::Vector3d U0_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    K_V_per_g.row(static_cast<Eigen::Index>(i)) = model.final[i].value.head<3>().transpose();
+    U0_V(static_cast<Eigen::Index>(i)) = model.final[i].value(3);
+  }
+  const Eigen::PartialPivLU<Eigen::Matrix3d> inverse(K_V_per_g);
+  std::vector<Eigen::Vector3d> a_g(readings.size());
+  for (std::size_t k = 0; k < a_g.size(); ++k) {
+    const Eigen::Vector3d U_V(readings.u_V[0][k], readings.u_V[1][k], readings.u_V[2][k]);
+    a_g[k] = inverse.solve(U_V - U0_V);
+  }
+
+  Corrected result;
+  const VisitLog log = make_visit_log(as_visits(readings, a_g), description);
+  std::vector<std::shared_ptr<const Effect>> owned;
+  const EnlargedParameters enlarged = restore_model(model, log, owned);
+  std::vector<ActiveEffect> effects;
+  for (const ActiveEffect& active : enlarged.effects) {
+    const bool good = can_be_computed(active);
+    add_name(good ? result.applied : result.left_out, active.effect->id());
+    if (good) effects.push_back(active);
+  }
+  // What restore_model() could not bring back belonged to one run or needs a column.
+  const auto missing = [&](const std::string& id) {
+    return std::none_of(enlarged.effects.begin(), enlarged.effects.end(),
+                        [&](const ActiveEffect& active) { return active.effect->id() == id; });
+  };
+  for (const FoundEffect& found : model.effects) {
+    if (missing(found.id)) add_name(result.left_out, found.id);
+  }
+  if (enlarged.effects.size() < model.effects.size() + model.unlisted.size()) {
+    for (const UnlistedStructure& found : model.unlisted) {
+      const bool there = std::any_of(
+          enlarged.effects.begin(), enlarged.effects.end(), [&](const ActiveEffect& active) {
+            return active.effect->id().find(found.driver) != std::string::npos;
+          });
+      if (!there) add_name(result.left_out, "unlisted: " + found.driver);
+    }
+  }
+
+  const std::vector<Eigen::Vector3d> bare_g = a_g;
+  for (int pass = 0; pass < kRepetitions && !effects.empty(); ++pass) {
+    std::vector<Eigen::Vector3d> next_g = bare_g;
+    for (std::size_t k = 0; k < a_g.size(); ++k) {
+      Eigen::Vector3d terms_V = Eigen::Vector3d::Zero();
+      const Eigen::Vector3d response_V = K_V_per_g * a_g[k];
+      for (const ActiveEffect& active : effects) {
+        const auto axis = static_cast<Eigen::Index>(active.axis);
+        const double K_ii = K_V_per_g(axis, axis);
+        const TermInput input{
+            log, k, active.axis, a_g, response_V(axis) / K_ii, U0_V(axis) + response_V(axis), K_ii};
+        terms_V(axis) += K_ii * active.effect->term_g(input, active.p.data());
+      }
+      next_g[k] -= inverse.solve(terms_V);
+    }
+    a_g = std::move(next_g);
+  }
+  result.a_mps2.reserve(a_g.size());
+  for (const Eigen::Vector3d& a : a_g) result.a_mps2.push_back(kStandardGravity_mps2 * a);
+  return result;
+}
+
+}  // namespace plumbline
