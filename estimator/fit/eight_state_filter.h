@@ -3,6 +3,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 
 #include "estimator/calibrate.h"
 #include "estimator/noise/noise_model.h"
@@ -35,6 +37,10 @@ struct EightStateOptions {
   double flicker_correlation_s = 100.0;
   /// Natural frequency of the second-order process that carries the ramp.
   double ramp_frequency_rad_s = 1e-3;
+  /// The filter as eq. 13–15 print it, to show what the corrections are for: the matrices of
+  /// continuous time taken for those of one step whatever its length, unit noise on the parameters
+  /// (V/g and V a step), the ramp as −ω₀ and −√2ω₀ on the diagonal, v2 measured beside v1.
+  bool as_printed = false;
 };
 
 /// What one measurement brought.
@@ -47,7 +53,10 @@ struct Innovation {
 
 /// Linear in all eight states. Time steps may be uneven; each is discretised exactly: the three
 /// noise processes and the parameters do not act on each other, so the matrix exponential is block
-/// diagonal and Van Loan's integral is taken for each block.
+/// diagonal and Van Loan's integral is taken for each block. Lengths of steps count to 1 ns, and
+/// what was worked out for a length is kept, so that samples that come unevenly cost no
+/// exponential. A prediction with an update takes some 60 ns and no memory: samples can be taken
+/// one by one as well as averaged.
 class EightStateFilter {
  public:
   using State = Eigen::Matrix<double, kEightStateCount, 1>;
@@ -71,11 +80,16 @@ class EightStateFilter {
  private:
   /// Transition over one time step and the noise that enters during it.
   struct Step {
-    double dt_s = -1;
-    Covariance F;
-    Covariance Q;
+    std::int64_t length_ns = -1;
+    /// State i + 4 becomes same[i]·itself + other[i]·(the other state of the ramp, i ≥ 2).
+    std::array<double, 4> same{};
+    std::array<double, 4> other{};
+    std::array<double, kEightStateCount> noise{};  ///< variances that enter
+    double noise_ramp = 0;                         ///< covariance of v1 and v2 that enters
   };
-  Step discretise(double dt_s) const;
+  Step discretise(std::int64_t length_ns) const;
+  Step printed_step() const;
+  const Step& step_of(std::int64_t length_ns);
 
   double flicker_rate_per_s_ = 0;
   double flicker_density_ = 0;  ///< driving density, V²/s
@@ -84,10 +98,12 @@ class EightStateFilter {
   double ramp_density_ = 0;  ///< V²/s³
   double ramp_frequency_ = 0;
   Eigen::Vector4d parameter_density_;
+  bool as_printed_ = false;
   double t_s_ = 0;
+  unsigned updates_ = 0;
   State x_;
   Covariance P_;
-  Step step_;
+  std::array<Step, 64> steps_;  ///< by a hash of their length
 };
 
 }  // namespace plumbline

@@ -46,13 +46,13 @@ BENCHMARK(filter_limit)
 
 void filter(benchmark::State& state) {
   NoiseModel noise;
-  noise.B.value = 1e-4;
-  noise.K.value = 1e-5;
-  noise.R.value = 1e-7;
+  noise.B = {1e-4, 0, true, 0};
+  noise.K = {1e-5, 0, true, 0};
+  noise.R = {1e-7, 0, true, 0};
   for (auto _ : state) {
     EightStateFilter filter(noise, {}, 0);
     for (int i = 1; i <= kUpdates; ++i) {
-      filter.predict(0.01 * i);
+      filter.predict(0.01 * i + 0.001 * (i % 3));
       filter.update({0.1 * (i % 7), 0.2, 0.5}, 0.1, 1e-8);
     }
     benchmark::DoNotOptimize(filter.state().data());

@@ -3,11 +3,29 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <atomic>
 #include <cmath>
+#include <cstdlib>
+#include <new>
 #include <random>
+#include <utility>
 
 #include "estimator/fit/least_squares.h"
 #include "estimator/kinematics.h"
+
+namespace {
+
+std::atomic<long> allocations = 0;
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace plumbline {
 namespace {
@@ -132,6 +150,95 @@ TEST(EightStateFilter, IsConsistent) {
   // Standard deviation of a mean of n χ²_k is √(2k/n); 3.29 of them are 99.9 %.
   EXPECT_NEAR(nees / kRuns, 4.0, 3.29 * std::sqrt(8.0 / kRuns));
   EXPECT_NEAR(nis / (kRuns * kPoses), 1.0, 3.29 * std::sqrt(2.0 / (kRuns * kPoses)));
+}
+
+// The same filter written down plainly: dense matrices, Joseph's form.
+TEST(EightStateFilter, EqualsDenseMatricesSampleBySample) {
+  const NoiseModel noise = coloured_noise();
+  EightStateOptions options;
+  options.prior_sd = {1e-2, 1e-2, 1e-2, 1e-1};
+  options.flicker_correlation_s = 3;
+  options.ramp_frequency_rad_s = 0.2;
+  options.parameter_walk = {1e-6, 2e-6, 3e-6, 4e-6};
+  EightStateFilter filter(noise, options, 0);
+  EightStateFilter::State x = filter.state();
+  EightStateFilter::Covariance P = filter.covariance();
+  // Of a step, by one over the same time from a known covariance.
+  const auto step_of = [&](double dt_s) {
+    EightStateFilter fresh(noise, options, 0);
+    const EightStateFilter::Covariance before = fresh.covariance();
+    fresh.predict(dt_s);
+    EightStateFilter::Covariance F = EightStateFilter::Covariance::Identity();
+    F(4, 4) = std::exp(-dt_s / 3);
+    const double w = 0.2, a = w / std::sqrt(2.0), e = std::exp(-a * dt_s);
+    const double c = std::cos(a * dt_s), s = std::sin(a * dt_s);
+    F(6, 6) = e * (c + s);
+    F(6, 7) = e * s / a;
+    F(7, 6) = -w * w * e * s / a;
+    F(7, 7) = e * (c - s);
+    return std::pair{F,
+                     EightStateFilter::Covariance(fresh.covariance() - F * before * F.transpose())};
+  };
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  double t_s = 0;
+  for (int i = 0; i < 300; ++i) {
+    const double dt_s = i % 50 == 0 ? 4.0 : 0.01 * (1 + i % 3);
+    t_s += dt_s;
+    const Eigen::Vector3d a_g = specific_force(70.0 * (i / 50), 13.0 * (i / 50), 1.0).a_g;
+    const double voltage_V = -2.5 + 0.03 * a_g.x() + 1e-4 * normal(random);
+    filter.predict(t_s);
+    filter.update(a_g, voltage_V, 1e-8);
+    const auto [F, Q] = step_of(dt_s);
+    x = F * x;
+    P = (F * P * F.transpose() + Q).eval();
+    EightStateFilter::State h;
+    h << a_g, 1, 1, 1, 1, 0;
+    const double variance = h.dot(P * h) + 1e-8;
+    const EightStateFilter::State gain = P * h / variance;
+    x += gain * (voltage_V - h.dot(x));
+    const EightStateFilter::Covariance keep =
+        EightStateFilter::Covariance::Identity() - gain * h.transpose();
+    P = (keep * P * keep.transpose() + 1e-8 * gain * gain.transpose()).eval();
+  }
+  const EightStateFilter::State sd = P.diagonal().cwiseSqrt();
+  EXPECT_LT((filter.state() - x).cwiseQuotient(sd).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((filter.covariance() - P).cwiseQuotient(sd * sd.transpose()).cwiseAbs().maxCoeff(),
+            1e-6);
+  EXPECT_LT((filter.covariance() - filter.covariance().transpose())
+                .cwiseQuotient(sd * sd.transpose())
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-9);
+}
+
+TEST(EightStateFilter, AsPrintedForgetsEverythingAtOnce) {
+  // Unit noise on the parameters at every step: what four poses said is gone with the fifth.
+  EightStateOptions options;
+  options.as_printed = true;
+  EightStateFilter printed(coloured_noise(), options, 0);
+  EightStateFilter corrected(coloured_noise(), {}, 0);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d a_g = specific_force(70.0 * i, 13.0 * (i % 7), 1.0).a_g;
+    for (EightStateFilter* filter : {&printed, &corrected}) {
+      filter->predict(5.0 * i);
+      filter->update(a_g, -2.5 + 0.032 * a_g.x(), 1e-9);
+    }
+  }
+  EXPECT_GT(std::sqrt(printed.parameters().covariance(3, 3)), 0.1);
+  EXPECT_LT(std::sqrt(corrected.parameters().covariance(3, 3)), 1e-3);
+}
+
+TEST(EightStateFilter, TakesNoMemoryInItsLoop) {
+  EightStateFilter filter(coloured_noise(), {}, 0);
+  allocations = 0;
+  for (int i = 1; i <= 1000; ++i) {
+    filter.predict(0.01 * i + 1e-4 * (i % 7));
+    filter.update({0.1 * (i % 7), 0.2, 0.5}, 0.1, 1e-8);
+  }
+  EXPECT_EQ(allocations, 0);
+  ::operator delete(::operator new(1));  // the counter counts
+  EXPECT_EQ(allocations, 1);
 }
 
 }  // namespace
