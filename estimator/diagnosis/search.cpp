@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/search.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -75,8 +76,10 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
 
 // Noise and parameters depend on each other only weakly: one round after the parameters are known
 // settles both. `known`: the noise when it has been pooled already; `before`: powers to start from.
+// `beside`: further functions of the visits, n × any number, that the noise is estimated beside.
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
-             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before) {
+             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before,
+             const Eigen::MatrixXd& beside = {}) {
   const auto predicted = predict_means_V(input.log, parameters);
   const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
   const Eigen::Index n = predicted[0].size();
@@ -98,8 +101,9 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
     if (known != nullptr) {
       stage.noise[i] = (*known)[i];
     } else {
-      const Eigen::MatrixXd design =
-          independent_columns(jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n));
+      Eigen::MatrixXd columns(n, jacobian.cols() + beside.cols());
+      columns << jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n), beside;
+      const Eigen::MatrixXd design = independent_columns(columns);
       const NoisePool pool(input.processes,
                            free.coarse ? without_record(input.noise[i]) : input.noise[i],
                            input.positioning_V2[i] + free.variance_V2);
@@ -116,6 +120,29 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
   });
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
+}
+
+// What changes slowly and could pass for slow noise: the time to the second order and what was
+// recorded; n × any number, each centred and of unit length.
+Eigen::MatrixXd slow_functions(const VisitLog& log) {
+  const auto n = static_cast<Eigen::Index>(log.visits.size());
+  Eigen::MatrixXd functions(n, 0);
+  const auto add = [&](const auto& value_of) {
+    Eigen::VectorXd column(n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      column(k) = value_of(log.visits[static_cast<std::size_t>(k)]);
+    column.array() -= column.mean();
+    if (!column.allFinite() || !(column.norm() > 0)) return;
+    functions.conservativeResize(Eigen::NoChange, functions.cols() + 1);
+    functions.rightCols<1>() = column.normalized();
+  };
+  const double middle_s = 0.5 * (log.first_s() + log.last_s());
+  add([&](const Visit& visit) { return visit.t_mean_s - middle_s; });
+  add([&](const Visit& visit) { return std::pow(visit.t_mean_s - middle_s, 2); });
+  if (log.has_temperature) add([](const Visit& visit) { return visit.temperature_K; });
+  for (std::size_t c = 0; c < log.covariate_names.size(); ++c)
+    add([c](const Visit& visit) { return visit.covariate[c]; });
+  return functions;
 }
 
 // How many independent looks the search amounts to: the best p-value of a search over pure noise
@@ -190,7 +217,8 @@ class Search {
   }
 
   SearchResult run() {
-    while (chosen_.size() < options_.max_effects && add_one()) drop_superfluous();
+    while (chosen_.size() < options_.max_effects && (add_one() || add_slow_one()))
+      drop_superfluous();
     while (exchange_one()) drop_superfluous();
     return result();
   }
@@ -270,6 +298,76 @@ class Search {
     chosen_.push_back(winner->candidate);
     p_values_.push_back(p);
     return true;
+  }
+
+  /// A slow effect that the noise was estimated without is partly taken for slow noise, and then
+  /// hides in it. So the noise is estimated once more, beside all that is slow; where that is
+  /// clearly better, the candidates are compared by the likelihood of each with its own noise.
+  bool add_slow_one() {
+    constexpr std::size_t kRefined = 4;
+    constexpr double kWorthALook = 1e-3;
+    const Eigen::MatrixXd beside = slow_functions(input_.log);
+    const EnlargedParameters& model = stage_.fit.parameters;
+    // The noise that was handed in may have been estimated beside more than the model.
+    const Stage plain = settle(input_, model, nullptr, &stage_.noise);
+    const Stage rich = settle(input_, model, nullptr, &stage_.noise, beside);
+    PerAxis<bool> worth_a_look{};
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const double gain = plain.noise[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
+      worth_a_look[i] =
+          chi_squared_tail(std::max(0.0, gain), static_cast<double>(beside.cols())) < kWorthALook;
+    }
+    if (std::none_of(worth_a_look.begin(), worth_a_look.end(), [](bool b) { return b; }))
+      return false;
+    const CandidateResponses responses =
+        candidate_responses(input_.log, list_, rich.whitening, rich.fit.parameters);
+    const CandidateGains gains(responses, rich.fit);
+    std::vector<Scored> ranked = screen(list_, gains, gains.of(rich.fit.whitened_residual).col(0));
+    std::erase_if(ranked, [&](const Scored& s) {
+      const Candidate& c = list_.candidates[s.candidate];
+      return c.effect->subject() == Subject::head || !worth_a_look[c.axis] ||
+             std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c) ||
+             !is_slow(c, beside);
+    });
+    const Scored* winner = nullptr;
+    EnlargedParameters with_winner;
+    double winner_score = std::numeric_limits<double>::infinity(), winner_log_p = 0;
+    for (std::size_t k = 0; k < std::min(kRefined, ranked.size()); ++k) {
+      const Candidate& candidate = list_.candidates[ranked[k].candidate];
+      const Stage with =
+          settle(input_, with_effect(model, candidate.active()), nullptr, &rich.noise);
+      if (!with.fit.determined) continue;
+      const double gain = plain.noise[candidate.axis].likelihood_deviance -
+                          with.noise[candidate.axis].likelihood_deviance;
+      const double log_p = log_chi_squared_tail(gain, gains.dof(ranked[k].candidate));
+      const double score = log_p + (ranked[k].score - ranked[k].log_p);
+      if (score < winner_score) {
+        winner = &ranked[k];
+        with_winner = with.fit.parameters;
+        winner_score = score;
+        winner_log_p = log_p;
+      }
+    }
+    if (winner == nullptr) return false;
+    // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
+    const double p = p_of_search(winner_log_p, static_cast<double>(ranked.size()));
+    p_best_rest_ = std::min(p_best_rest_, p);
+    if (p > options_.false_alarm_of_slow || !adopt(with_winner)) return false;
+    chosen_.push_back(winner->candidate);
+    p_values_.push_back(p);
+    return true;
+  }
+
+  /// Whether most of what a candidate does to its axis lies in the span of the slow functions.
+  bool is_slow(const Candidate& candidate, const Eigen::MatrixXd& functions) const {
+    constexpr double kMost = 0.7;  // of the sum of squares
+    const EnlargedParameters& model = stage_.fit.parameters;
+    Eigen::VectorXd change =
+        predict_means_V(input_.log, with_effect(model, candidate.active()))[candidate.axis] -
+        predict_means_V(input_.log, model)[candidate.axis];
+    change.array() -= change.mean();
+    const Eigen::VectorXd left = change - functions * functions.colPivHouseholderQr().solve(change);
+    return left.squaredNorm() < (1 - kMost) * change.squaredNorm();
   }
 
   /// A term that holds one of the model's effects as a special case cannot stand beside it: it

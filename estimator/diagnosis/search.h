@@ -16,6 +16,9 @@ struct SearchOptions {
   /// Nominal chance that noise alone makes the search claim an effect. Far below the 1 % wanted,
   /// because the noise itself is only estimated: slow drifts come out too significant.
   double false_alarm = 1e-4;
+  /// The same for a slow effect that is compared with the noise estimated anew under each
+  /// hypothesis.
+  double false_alarm_of_slow = 1e-3;
   int replicates = 150;  ///< of simulated noise, for the look-elsewhere correction
   std::size_t max_effects = 6;
 };

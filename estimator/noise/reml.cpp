@@ -66,8 +66,9 @@ Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixX
   const Eigen::MatrixXd inverse = inverse_from_factor(cholesky.matrixLLT());
   const Eigen::MatrixXd weighted = inverse * design;
   result.P = inverse - weighted * normal.solve(weighted.transpose());
-  result.log_determinant = 2 * cholesky.matrixLLT().diagonal().array().log().sum() +
-                           2 * normal.matrixLLT().diagonal().array().log().sum();
+  result.log_determinant_of_design = 2 * normal.matrixLLT().diagonal().array().log().sum();
+  result.log_determinant =
+      2 * cholesky.matrixLLT().diagonal().array().log().sum() + result.log_determinant_of_design;
   return result;
 }
 
@@ -76,6 +77,7 @@ Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixX
 struct NoisePool::Point {
   Eigen::VectorXd power;
   double deviance = 0;
+  double likelihood_deviance = 0;
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
 };
@@ -170,11 +172,12 @@ void NoisePool::add_record(const Eigen::VectorXd& power, Point& point) const {
 NoisePool::Point NoisePool::evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
   const Eigen::Index count = processes_->count();
-  Point point{power, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
   add_record(power, point);
   const Projector projector = make_projector(covariance(power), design);
   const Eigen::VectorXd py = projector.P * mean;
   point.deviance += projector.log_determinant + mean.dot(py);
+  point.likelihood_deviance = point.deviance - projector.log_determinant_of_design;
   // The average information (Gilmour, Thompson & Cullis, 1995) has the expected one's mean and
   // costs products with vectors only.
   Eigen::MatrixXd seen(mean.size(), count);
@@ -194,7 +197,7 @@ Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise,
                                           const Eigen::MatrixXd& design) const {
   const Eigen::Index count = processes_->count();
   const Eigen::MatrixXd P = make_projector(noise.covariance, design).P;
-  Point point{noise.power, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  Point point{noise.power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
   add_record(noise.power, point);
   // Of processes that were estimated at zero, the ones with names are asked for all the same.
   std::vector<Eigen::Index> wanted;
@@ -260,6 +263,7 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
   }
   result.power = now.power;
   result.deviance = now.deviance;
+  result.likelihood_deviance = now.likelihood_deviance;
   result.covariance = covariance(now.power);
   return result;
 }

@@ -29,6 +29,8 @@ struct PooledNoise {
   /// Of both sources about the powers; filled by information_of() only.
   Eigen::MatrixXd information;
   double deviance = 0;  ///< −2 ln of the restricted likelihood but for a constant
+  /// −2 ln of the full likelihood at these powers but for a constant: comparable between designs.
+  double likelihood_deviance = 0;
   bool converged = false;
 };
 
@@ -81,7 +83,8 @@ NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
 /// the generalised least-squares residual r.
 struct Projector {
   Eigen::MatrixXd P;
-  double log_determinant = 0;  ///< ln|Σ| + ln|X'Σ⁻¹X|
+  double log_determinant = 0;            ///< ln|Σ| + ln|X'Σ⁻¹X|
+  double log_determinant_of_design = 0;  ///< ln|X'Σ⁻¹X|
 };
 Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design);
 
