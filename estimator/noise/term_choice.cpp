@@ -80,6 +80,13 @@ class Chooser {
     }
     TermChoice choice;
     choice.chosen = grow(start);
+    // A flicker that ends below the upper end of the spectrum looks like less white noise and some
+    // quantization.
+    if (start.quantization) {
+      if (const TermDescription other = grow(describe({}, false, nullptr));
+          other.score() < choice.chosen.score())
+        choice.chosen = other;
+    }
     // Limits of the flicker, cheaper one by one, can stand in the way of a Gauss-Markov term.
     const SpectrumShape& shape = choice.chosen.shape;
     if (shape.markov_tau_s.empty() &&

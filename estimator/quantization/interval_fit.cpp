@@ -240,7 +240,7 @@ std::optional<std::vector<CodeCounts>> count_codes(const SampleTable& samples,
 
 IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
                           const Eigen::VectorXd& known_variance) {
-  constexpr int kSearchSweeps = 6, kFinalSweeps = 40, kMostEvaluations = 48;
+  constexpr int kSearchSweeps = 6, kFinalSweeps = 40, kMostEvaluations = 64;
   constexpr double kLeastSigma = 0.002, kLeastScatter = 0.0003, kMost = 5;
   const Scales guess = first_guess(A, codes);
   const bool single = std::all_of(codes.begin(), codes.end(), [](const CodeCounts& pose) {
@@ -249,33 +249,45 @@ IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts
 
   // Pattern search over both logarithms; with single readings they cannot be told apart.
   Propagation search(A, codes, known_variance);
-  std::array<double, 2> at = {std::log(guess.sigma),
-                              std::log(single ? kLeastScatter : guess.scatter)};
+  std::array<double, 2> at = {std::log(guess.sigma), std::log(kLeastScatter)};
   const auto evidence_of = [&](const std::array<double, 2>& x) {
     return search.run(std::exp(x[0]), std::exp(x[1]), kSearchSweeps);
   };
   double best = evidence_of(at);
   int evaluations = 1;
-  for (double step = 0.8; step > 0.1 && evaluations < kMostEvaluations;) {
-    bool better = false;
-    for (std::size_t d = 0; d < (single ? 1U : 2U); ++d) {
-      for (const double sign : {-1.0, 1.0}) {
-        std::array<double, 2> next = at;
-        next[d] += sign * step;
-        if (next[0] < std::log(kLeastSigma) || next[1] < std::log(kLeastScatter) ||
-            std::max(next[0], next[1]) > std::log(kMost)) {
-          continue;
+  const auto climb = [&](std::size_t dimensions, double first_step) {
+    for (double step = first_step; step > 0.1 && evaluations < kMostEvaluations;) {
+      bool better = false;
+      for (std::size_t d = 0; d < dimensions; ++d) {
+        for (const double sign : {-1.0, 1.0}) {
+          std::array<double, 2> next = at;
+          next[d] += sign * step;
+          if (next[0] < std::log(kLeastSigma) || next[1] < std::log(kLeastScatter) ||
+              std::max(next[0], next[1]) > std::log(kMost)) {
+            continue;
+          }
+          const double evidence = evidence_of(next);
+          ++evaluations;
+          if (!(evidence > best + 1e-3)) continue;
+          best = evidence;
+          at = next;
+          better = true;
+          break;
         }
-        const double evidence = evidence_of(next);
-        ++evaluations;
-        if (!(evidence > best + 1e-3)) continue;
-        best = evidence;
-        at = next;
-        better = true;
-        break;
       }
+      if (!better) step /= 2;
     }
-    if (!better) step /= 2;
+  };
+  climb(1, 0.8);
+  if (!single) {
+    // Scatter that the codes do not ask for costs precision: it has to earn its place.
+    constexpr double kScatterGain = 2;
+    const std::array<double, 2> without = at;
+    const double evidence_without = best;
+    at[1] = std::log(guess.scatter);
+    best = evidence_of(at);
+    climb(2, 0.8);
+    if (best < evidence_without + kScatterGain) at = without;
   }
 
   IntervalFit fit;

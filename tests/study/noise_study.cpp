@@ -1,5 +1,6 @@
 #include "tests/study/noise_study.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/noise/identify.h"
@@ -41,6 +42,16 @@ const std::vector<NoiseCase>& noise_cases() {
        .step = 7.6e-5},
       {.name = "white, flicker and walk, 60000 samples",
        .truth = {.N = 2.5e-5, .B = 4e-5, .K = 2e-5},
+       .samples = 60'000},
+      // Corners a factor of 4 apart: B² = π·s²/ln 4.
+      {.name = "white and relaxations up to 2 Hz, 60000 samples",
+       .truth = {.N = 2.5e-5,
+                 .relaxation = 4e-5,
+                 .relaxation_tau_s = {0.0796, 0.318, 1.27, 5.09, 20.4, 81.5, 326}},
+       .samples = 60'000,
+       .relaxation_B = 6.02e-5},
+      {.name = "white and one relaxation of 1 s, 60000 samples",
+       .truth = {.N = 2.5e-5, .relaxation = 5e-5, .relaxation_tau_s = {1}},
        .samples = 60'000}};
   return cases;
 }
@@ -51,7 +62,8 @@ NoiseStudy study_noise(const NoiseCase& noise_case, int records, std::uint64_t f
   parallel_for(count, [&](std::size_t i) { found[i] = identify_one(noise_case, first_seed + i); });
   NoiseStudy study;
   const sim::NoiseTerms& truth = noise_case.truth;
-  const double values[kTermCount] = {truth.Q, truth.N, truth.B, truth.K, truth.R};
+  const double values[kTermCount] = {truth.Q, truth.N, std::max(truth.B, noise_case.relaxation_B),
+                                     truth.K, truth.R};
   const double share = 1 / static_cast<double>(records);
   for (std::size_t i = 0; i < kTermCount; ++i) {
     NoiseFigures& figures = study.term[i];

@@ -19,6 +19,8 @@ struct NoiseCase {
   double step = 0;  ///< of the converter, 0: none
   /// Standard deviations that the likelihood allows at best, relative, Q N B K; 0: not stated.
   std::array<double, 4> bound{};
+  /// B that the relaxations amount to where they lie side by side.
+  double relaxation_B = 0;
 };
 const std::vector<NoiseCase>& noise_cases();
 

@@ -11,17 +11,20 @@ int main(int argc, char** argv) {
   using namespace plumbline::study;
   int records = 300;
   std::uint64_t seed = 1;
+  std::string only;
   CLI::App app{"What the noise identification says of simulated records with known terms"};
   app.add_option("records", records, "records of each kind")
       ->check(CLI::Range(2, 1000000))
       ->capture_default_str();
   app.add_option("--seed", seed, "of the first record")->capture_default_str();
+  app.add_option("--only", only, "cases whose name contains this");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   for (const NoiseCase& noise_case : noise_cases()) {
+    if (noise_case.name.find(only) == std::string::npos) continue;
     const NoiseStudy study = study_noise(noise_case, records, seed);
     fmt::print("\n{}, {} records\n", noise_case.name, records);
     fmt::print("  term      truth       mean   sd/truth    bound    mean u/sd  covered  present\n");
@@ -37,5 +40,6 @@ int main(int argc, char** argv) {
     }
     fmt::print("  described {:.1f} %, with a line {:.1f} %, with a Gauss-Markov term {:.1f} %\n",
                100 * study.adequate, 100 * study.lines, 100 * study.markov);
+    std::fflush(stdout);
   }
 }
