@@ -21,6 +21,7 @@
 #include "estimator/kinematics.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/identify.h"
+#include "estimator/noise/longest_stretch.h"
 #include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
 #include "estimator/quantization/quantized_axis.h"
@@ -66,10 +67,10 @@ double samples_per_pose(const MeasurementSet& run) {
   return static_cast<double>(run.samples.size()) / static_cast<double>(run.poses.size());
 }
 
-/// Mean time between the samples of the static record; a thousandth of a second without one.
+/// Time between the samples of the static record; a thousandth of a second without one.
 double static_step_s(const SampleTable* record) {
-  if (record == nullptr || record->size() < 2) return 1e-3;
-  return (record->t_s.back() - record->t_s.front()) / static_cast<double>(record->size() - 1);
+  const double step_s = record != nullptr ? longest_stretch(record->t_s).step_s : 0;
+  return step_s > 0 ? step_s : 1e-3;
 }
 
 /// White noise of one reading: within the dwells, or in the record when every pose is read once;
@@ -88,7 +89,15 @@ NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
   NoiseModel noise;
   const SampleTable* record = input.static_record;
   if (record != nullptr && record->size() > 1) {
-    noise = identify_noise(record->u_V[axis], 1.0 / static_step_s(record));
+    const Stretch stretch = longest_stretch(record->t_s);
+    const auto from = record->u_V[axis].begin() + static_cast<std::ptrdiff_t>(stretch.first);
+    noise = identify_noise({from, from + static_cast<std::ptrdiff_t>(stretch.count)},
+                           1.0 / stretch.step_s);
+    if (stretch.gaps > 0) {
+      noise.remark = "the static record has " + std::to_string(stretch.gaps) +
+                     " gaps; its longest stretch of " + std::to_string(stretch.count) +
+                     " samples was used" + (noise.remark.empty() ? "" : "; ") + noise.remark;
+    }
   } else {
     noise = identify_noise_from_bursts(input.run.samples, input.run.poses, axis);
   }

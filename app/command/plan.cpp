@@ -11,6 +11,7 @@
 #include "app/config/rig_description.h"
 #include "app/io/files.h"
 #include "app/sequencer/plan.h"
+#include "app/sequencer/shortest_plan.h"
 
 namespace plumbline::app {
 
@@ -23,11 +24,27 @@ struct PlanArguments {
   std::optional<std::uint64_t> seed;
   bool print = false;
   std::string csv;
+  std::optional<double> until_u_mps2;
+  double pose_sd_mps2 = 0.03;
 };
 
 std::string minutes(double seconds) {
   const auto whole = std::lround(seconds);
   return fmt::format("{} min {:02} s", whole / 60, whole % 60);
+}
+
+void show_precision(const ShortestPlan& shortest, const PlanArguments& arguments) {
+  fmt::print(
+      "uncertainty of a measured component by the parameters (RMS over the sphere, pose means to "
+      "{} m/s²)\npositions  in this order, m/s²  D-optimal, m/s²\n",
+      arguments.pose_sd_mps2);
+  for (const PrecisionStep& step : shortest.course)
+    fmt::print("{:>9}  {:>20.4g}  {:>15.4g}\n", step.positions, step.in_order_mps2,
+               step.d_optimal_mps2);
+  fmt::print(
+      "{} positions reach {:.3g} m/s²; in this order {}\n", shortest.positions, shortest.u_mps2,
+      shortest.in_order_positions > 0 ? fmt::format("it takes {}", shortest.in_order_positions)
+                                      : std::string("all of them do not"));
 }
 
 Result<ExitCode> show_plan(const PlanArguments& arguments) {
@@ -37,12 +54,21 @@ Result<ExitCode> show_plan(const PlanArguments& arguments) {
   options.order = visit_order_from(arguments.order).value_or(options.order);
   options.one_sided = options.one_sided || arguments.one_sided;
   options.seed = arguments.seed.value_or(options.seed);
-  const Plan plan = make_plan(rig->run.grid, options, rig->sensor.rate_hz);
+  Plan plan = make_plan(rig->run.grid, options, rig->sensor.rate_hz);
+  std::optional<ShortestPlan> shortest;
+  if (arguments.until_u_mps2) {
+    auto found = shortest_plan(plan, options, rig->run.gravity,
+                               {*arguments.until_u_mps2, arguments.pose_sd_mps2});
+    if (!found) return fail(found.error());
+    shortest = std::move(*found);
+    plan = shortest->plan;
+  }
   if (rig->soft_limits) {
     if (auto allowed = check_plan(plan, *rig->soft_limits); !allowed) {
       return fail(ErrorCode::input, arguments.config + ": " + allowed.error().message);
     }
   }
+  if (shortest) show_precision(*shortest, arguments);
   if (arguments.print) fmt::print("{}", to_csv(plan));
   if (!arguments.csv.empty()) {
     if (auto written = write_file_atomically(arguments.csv, to_csv(plan)); !written) {
@@ -74,6 +100,15 @@ void add_plan(CLI::App& program, Invocation& invocation) {
   sub->add_option("--seed", arguments->seed, "of random order and verification angles");
   sub->add_flag("--print", arguments->print, "print every step as CSV");
   sub->add_option("--csv", arguments->csv, "write the steps into this file");
+  sub->add_option("--until-u", arguments->until_u_mps2,
+                  "only the positions that are needed until the parameters are known so well: "
+                  "standard uncertainty of a measured component, m/s² (RMS over the sphere)")
+      ->check(CLI::PositiveNumber);
+  sub->add_option("--pose-sd", arguments->pose_sd_mps2,
+                  "for --until-u: standard deviation of a pose mean, m/s², as the floor in the "
+                  "result of a unit of this kind")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   sub->callback([arguments, &invocation] {
     invocation.action = [arguments] { return show_plan(*arguments); };
   });

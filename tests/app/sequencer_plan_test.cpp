@@ -8,6 +8,8 @@
 #include <map>
 #include <set>
 
+#include "app/sequencer/shortest_plan.h"
+
 namespace plumbline::app {
 namespace {
 
@@ -228,6 +230,41 @@ TEST(Plan, SeedDecidesRandomOrderAndVerification) {
   EXPECT_EQ(first, to_csv(make_plan(Grid{}, options, kRate_Hz)));
   options.seed = 2;
   EXPECT_NE(first, to_csv(make_plan(Grid{}, options, kRate_Hz)));
+}
+
+TEST(ShortestPlan, FewerPositionsThanTheOrderOfTheGrid) {
+  PlanOptions options;
+  options.order = VisitOrder::raster;
+  options.one_sided = true;
+  const Plan all = make_plan({{0, 350, 10}, {0, 80, 10}}, options, kRate_Hz);
+  const auto shortest = shortest_plan(all, options, {}, {0.02, 0.03});
+  ASSERT_TRUE(shortest) << shortest.error().message;
+  // By hand: of 324 positions the first ring and some of the next are needed in the order of the
+  // grid; spread over the sphere, four parameters of variance (0.02/0.03)² take a dozen.
+  EXPECT_LE(shortest->positions, 16U);
+  EXPECT_GE(shortest->positions, 6U);
+  EXPECT_GT(shortest->in_order_positions, 36U);
+  EXPECT_LE(shortest->u_mps2, 0.02);
+  std::size_t grid = 0;
+  for (std::size_t k = 0; k < shortest->plan.steps.size(); ++k) {
+    const PlanStep& step = shortest->plan.steps[k];
+    EXPECT_EQ(step.ordinal, static_cast<long long>(k));
+    grid += step.kind == PoseKind::grid ? 1 : 0;
+    if (k > 0 && step.target.delta_deg < shortest->plan.steps[k - 1].target.delta_deg) {
+      EXPECT_EQ(step.via.size(), 1U) << k;
+    } else if (k > 0) {
+      EXPECT_TRUE(step.via.empty()) << k;
+    }
+  }
+  EXPECT_EQ(grid, shortest->positions);
+  const auto& course = shortest->course;
+  for (std::size_t k = 1; k < course.size(); ++k) {
+    EXPECT_LE(course[k].d_optimal_mps2, course[k - 1].d_optimal_mps2);
+    EXPECT_LE(course[k].d_optimal_mps2, course[k].in_order_mps2 * (1 + 1e-9));
+  }
+  const auto never = shortest_plan(all, options, {}, {1e-6, 0.03});
+  ASSERT_FALSE(never);
+  EXPECT_THAT(never.error().message, HasSubstr("all 324 positions"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/noise/longest_stretch.h"
 #include "tests/estimator/synthetic_run.h"
 
 namespace plumbline {
@@ -219,6 +220,40 @@ void expect_coverage(const Adc& adc, double sigma_V) {
 TEST(Coverage, SixteenBits) { expect_coverage(kSixteenBits, 3e-4); }
 TEST(Coverage, TwelveBitsWithNoiseOfHalfAStep) {
   expect_coverage(kTwelveBits, 0.5 * kTwelveBits.lsb_V());
+}
+
+TEST(Calibrate, StaticRecordWithGapsIsUsedUpToThem) {
+  SyntheticRun data = synthetic_run(8, {16, -5.0, 0.0});
+  const Calibration whole = calibrate({data.run, &data.still, data.description}, {});
+  // 10 s and 40 s of record, 600 s between them; meanwhile the level has moved.
+  for (std::size_t i = 1000; i < data.still.size(); ++i) {
+    data.still.t_s[i] += 600;
+    for (auto& axis : data.still.u_V) axis[i] += 0.01;
+  }
+  for (double& t_s : data.run.samples.t_s) t_s += 600;
+  const Calibration parted = calibrate({data.run, &data.still, data.description}, {});
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    EXPECT_THAT(parted.noise[axis].remark, testing::HasSubstr("1 gaps"));
+    EXPECT_THAT(whole.noise[axis].remark, testing::Not(testing::HasSubstr("gaps")));
+    EXPECT_NEAR(parted.noise[axis].rate_hz, 100, 0.01);
+    EXPECT_NEAR(parted.noise[axis].N.value, whole.noise[axis].N.value,
+                0.05 * whole.noise[axis].N.value);
+    EXPECT_LT(parted.noise[axis].K.value, 1e-4);
+  }
+}
+
+TEST(LongestStretch, OfThreeWithUnevenSteps) {
+  std::vector<double> t_s;
+  for (int i = 0; i < 10; ++i) t_s.push_back(0.1 * i);
+  for (int i = 0; i < 20; ++i) t_s.push_back(5 + 0.1 * i + (i % 2 == 0 ? 0.02 : 0));
+  for (int i = 0; i < 5; ++i) t_s.push_back(9 + 0.1 * i);
+  const Stretch stretch = longest_stretch(t_s);
+  EXPECT_EQ(stretch.first, 10U);
+  EXPECT_EQ(stretch.count, 20U);
+  EXPECT_EQ(stretch.gaps, 2U);
+  EXPECT_NEAR(stretch.step_s, 0.1, 0.002);
+  EXPECT_EQ(longest_stretch({}).count, 0U);
+  EXPECT_EQ(longest_stretch({3.0}).count, 1U);
 }
 
 }  // namespace

@@ -33,19 +33,53 @@ sim::World world_with(const Converter& converter) {
   // the residual test must not be taken in by them.
   world.room = world_file("default.toml").room;
   world.adc.bits = converter.bits;
-  for (sim::NoiseTerms& noise : world.noise_V)
-    noise = {.N = converter.noise_steps * world.adc.lsb_V() / std::sqrt(world.rate_hz)};
+  const double sample_V = converter.noise_steps * world.adc.lsb_V();
+  for (sim::NoiseTerms& noise : world.noise_V) {
+    noise = {.N = sample_V / std::sqrt(world.rate_hz)};
+    if (!converter.coloured) continue;
+    constexpr double kRun_s = 1000;  // 324 poses in some 3 s each
+    const double mean_V = sample_V / std::sqrt(sim::RecordOptions{}.samples_per_pose);
+    noise.B = mean_V / 0.664;
+    noise.K = mean_V / std::sqrt(kRun_s / 6);
+  }
   return world;
 }
 
-UnitOutcome calibrate_unit(const sim::World& world, std::uint64_t seed, double delta_step_deg) {
+/// Mean over the poses of the slow noise alone. White and slow noise are drawn apart, so that the
+/// same seed gives the same slow noise without the white one.
+PerAxis<double> slow_level_V(sim::World world, const sim::RecordOptions& options) {
+  world.adc.bits = 24;
+  const auto levels = [&] {
+    PerAxis<double> level{};
+    const MeasurementSet run = sim::record_set(world, options).run;
+    for (const Pose& pose : run.poses) {
+      for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+        double sum = 0;
+        for (std::size_t row = pose.first; row < pose.first + pose.count; ++row)
+          sum += run.samples.u_V[axis][row];
+        level[axis] += sum / static_cast<double>(pose.count * run.poses.size());
+      }
+    }
+    return level;
+  };
+  for (sim::NoiseTerms& noise : world.noise_V) noise.N = 0;
+  PerAxis<double> level = levels();
+  for (sim::NoiseTerms& noise : world.noise_V) noise = {};
+  const PerAxis<double> quiet = levels();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) level[axis] -= quiet[axis];
+  return level;
+}
+
+UnitOutcome calibrate_unit(const sim::World& world, bool coloured, std::uint64_t seed,
+                           double delta_step_deg) {
   sim::RecordOptions options;
   options.seed = seed;
   options.grid.delta.stop_deg = 360 - delta_step_deg;
   options.grid.delta.step_deg = delta_step_deg;
-  options.soak_s = 100;
+  options.soak_s = coloured ? 600 : 100;
   options.verification_poses = 0;
   const sim::RecordedSet set = sim::record_set(world, options);
+  const PerAxis<double> level_V = coloured ? slow_level_V(world, options) : PerAxis<double>{};
   const Calibration calibration = calibrate({set.run, &set.soak, set.description}, {});
 
   UnitOutcome outcome;
@@ -53,7 +87,7 @@ UnitOutcome calibrate_unit(const sim::World& world, std::uint64_t seed, double d
   outcome.verdict = calibration.diagnosis.verdict;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const PerAxis<double>& K = set.truth.triad.K_V_per_g[axis];
-    const Eigen::Vector4d truth(K[0], K[1], K[2], set.truth.triad.U0_V[axis]);
+    const Eigen::Vector4d truth(K[0], K[1], K[2], set.truth.triad.U0_V[axis] + level_V[axis]);
     const auto normalised_error = [&](const AxisEstimate& estimate) -> Eigen::Vector4d {
       return (estimate.value - truth).cwiseQuotient(estimate.covariance.diagonal().cwiseSqrt());
     };
@@ -82,11 +116,12 @@ std::string parameter_name(Eigen::Index parameter) {
 }
 
 std::string to_string(const Converter& converter) {
-  return fmt::format("{} bits, white noise of {} steps", converter.bits, converter.noise_steps);
+  return fmt::format("{} bits, white noise of {} steps{}", converter.bits, converter.noise_steps,
+                     converter.coloured ? ", flicker and walk as large in a pose mean" : "");
 }
 
 const std::vector<Converter>& converters() {
-  static const std::vector<Converter> all = {{16, 4.0}, {12, 1.0}, {12, 0.5}};
+  static const std::vector<Converter> all = {{16, 4.0}, {12, 1.0}, {12, 0.5}, {16, 4.0, true}};
   return all;
 }
 
@@ -98,7 +133,8 @@ std::vector<UnitOutcome> calibrate_units(const Converter& converter, const UnitS
   std::atomic<std::size_t> next = 0;
   const auto work = [&] {
     for (std::size_t unit = next++; unit < count; unit = next++)
-      outcomes[unit] = calibrate_unit(world, series.first_seed + unit, series.delta_step_deg);
+      outcomes[unit] = calibrate_unit(world, converter.coloured, series.first_seed + unit,
+                                      series.delta_step_deg);
   };
   std::vector<std::jthread> helpers;
   for (int thread = 1; thread < series.threads; ++thread) helpers.emplace_back(work);

@@ -1,7 +1,9 @@
 // Do the stated uncertainties hold? Simulated units with known truth, calibrated one after another.
 //
-// Noise is white and nothing is undeclared, so the truth of a unit is exactly the 12 parameters it
-// was drawn with: no effect moves U0, the head is ideal, gravity is what the description says.
+// Nothing is undeclared, so the truth of a unit is exactly the 12 parameters it was drawn with: no
+// effect moves U0, the head is ideal, gravity is what the description says. Where the noise is
+// coloured, U0 is the level of the run: its slow noise averaged over the poses counts as part of
+// it.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,10 +25,14 @@ std::string parameter_name(Eigen::Index parameter);
 struct Converter {
   int bits = 16;
   double noise_steps = 4;  ///< standard deviation of a sample, in steps of the converter
+  /// Flicker (its Allan plateau) and random walk (its standard deviation about its mean over the
+  /// run) as large as the white noise of a pose mean, and a static record of 10 min.
+  bool coloured = false;
 };
 std::string to_string(const Converter& converter);
 
-/// The converters of the study: a fine one, and the paper's with noise of one and of half a step.
+/// The converters of the study: a fine one, the paper's with noise of one and of half a step, and
+/// the fine one with coloured noise.
 const std::vector<Converter>& converters();
 
 /// One calibrated unit.

@@ -51,6 +51,7 @@ bool report(const Converter& converter, const Coverage& coverage) {
   fmt::print("  {}: overall share {:.2f} %, demanded {:.0f} … {:.0f} %\n",
              holds ? "holds" : "FAILS", 100 * coverage.overall_share, 100 * kLowestShare,
              100 * kHighestShare);
+  std::fflush(stdout);
   return holds;
 }
 
@@ -68,6 +69,8 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--seed", series.first_seed, "of the first unit; the others count up from it")
       ->capture_default_str();
+  bool only_coloured = false;
+  app.add_flag("--coloured", only_coloured, "only the units with coloured noise");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -76,6 +79,7 @@ int main(int argc, char** argv) {
 
   bool holds = true;
   for (const Converter& converter : converters()) {
+    if (only_coloured && !converter.coloured) continue;
     const auto outcomes = calibrate_units(converter, series);
     holds = report(converter, summarise(outcomes)) && holds;
     series.first_seed +=
