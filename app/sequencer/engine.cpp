@@ -164,24 +164,22 @@ const PlanStep* Engine::next_step(const Plan& plan, bool put_off) const {
 
 Engine::Outcome<void> Engine::start_up(const Plan& plan, const StartPoint& start) {
   enter(EngineState::idle, "waiting for the sensor and the drive");
-  if (auto heard = await_first_sample(); !heard) return heard;
-  if (auto connected = asked(head_.connect()); !connected) return give_up(connected.error().error);
-  if (auto known = identify(start); !known) return known;
-  auto limits = asked(head_.soft_limits());
-  if (!limits) return give_up(limits.error().error);
-  if (drive_has_limits(*limits)) {
-    if (auto allowed = check_plan(plan, *limits); !allowed) return give_up(allowed.error());
-  }
-  auto status = asked(head_.status());
-  if (!status) return give_up(status.error().error);
-  if (status->alarm[0] != 0 || status->alarm[1] != 0) {
-    note("fault",
-         fmt::format("the drive starts with an alarm (δ {}, h {}); reset",
-                     rig::alarm_text(status->alarm[0]), rig::alarm_text(status->alarm[1])));
-    if (auto reset = asked(head_.reset_alarm()); !reset) return give_up(reset.error().error);
-  }
-  if (auto armed = asked(head_.arm_watchdog(options_.watchdog)); !armed) {
-    return give_up(armed.error().error);
+  if (auto heard = await_first_sample(start.resumed); !heard) return heard;
+  // At a new run somebody stands beside it. A run that goes on does so by itself in the night,
+  // after a power cut perhaps while the drive is still starting.
+  const auto limit =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(options_.recovery.wait_s);
+  for (int attempt = 1;; ++attempt) {
+    auto met = meet_drive(plan, start);
+    if (met) break;
+    if (met.error().trouble != Trouble::repeat) return met;
+    const bool again = start.resumed ? std::chrono::steady_clock::now() < limit
+                                     : attempt < options_.recovery.attempts_per_pose;
+    if (!again) return give_up(met.error().error);
+    note("retry", fmt::format("start, attempt {}: {}", attempt, met.error().error.message));
+    if (auto waited = back_off(attempt); !waited) return waited;
+    if (!sensor_failure_) continue;
+    if (auto heard = await_sensor(); !heard) return heard;
   }
   for (int attempt = 1;; ++attempt) {
     auto homed = attempt == 1 ? home() : recover("the first homing failed", attempt);
@@ -199,10 +197,34 @@ Engine::Outcome<void> Engine::start_up(const Plan& plan, const StartPoint& start
   }
 }
 
-Engine::Outcome<void> Engine::await_first_sample() {
+Engine::Outcome<void> Engine::meet_drive(const Plan& plan, const StartPoint& start) {
+  if (auto connected = asked(head_.connect()); !connected) return connected;
+  if (auto known = identify(start); !known) return known;
+  auto limits = asked(head_.soft_limits());
+  if (!limits) return tl::unexpected(limits.error());
+  if (drive_has_limits(*limits)) {
+    if (auto allowed = check_plan(plan, *limits); !allowed) return give_up(allowed.error());
+  }
+  auto status = asked(head_.status());
+  if (!status) return tl::unexpected(status.error());
+  if (status->alarm[0] != 0 || status->alarm[1] != 0) {
+    note("fault",
+         fmt::format("the drive starts with an alarm (δ {}, h {}); reset",
+                     rig::alarm_text(status->alarm[0]), rig::alarm_text(status->alarm[1])));
+    if (auto reset = asked(head_.reset_alarm()); !reset) return reset;
+  }
+  return asked(head_.arm_watchdog(options_.watchdog));
+}
+
+Engine::Outcome<void> Engine::await_first_sample(bool resumed) {
   while (!any_sample_) {
     if (control_.stop_requested()) return stop_asked_for();
     auto batch = acquisition_.take(kFirstSampleWait);
+    if (!batch && resumed) {
+      note("retry", "start: " + batch.error().message);
+      if (auto heard = await_sensor(); !heard) return heard;
+      continue;
+    }
     if (!batch) return give_up(batch.error());
     if (batch->ended) return give_up({ErrorCode::rig, "the recorded log of the sensor ended"});
     use(*batch);
@@ -212,25 +234,25 @@ Engine::Outcome<void> Engine::await_first_sample() {
 }
 
 Engine::Outcome<void> Engine::identify(const StartPoint& start) {
+  if (identified_) return {};
   auto drive = asked(head_.identity());
-  if (!drive) return give_up(drive.error().error);
+  if (!drive) return tl::unexpected(drive.error());
   const double limit_s = newest_.t_s + kIdentityWait_s;
   while (options_.node_tells_identity && node_identity_.empty() && newest_.t_s < limit_s) {
     if (control_.stop_requested()) return stop_asked_for();
-    if (auto received = receive(); !received) return give_up(received.error().error);
+    if (auto received = receive(); !received) return received;
     if (auto waited = wait(options_.poll_interval); !waited) return waited;
   }
   const storage::RigIdentity now{*drive, node_identity_};
   note("identity", fmt::format("drive {}, node {}", or_unknown(now.drive), or_unknown(now.node)));
   if (!start.identity) {
     if (auto stored = store_.set_identity(run_, now); !stored) return give_up(stored.error());
-    return {};
-  }
-  if (const auto other = other_rig(*start.identity, now)) {
+  } else if (const auto other = other_rig(*start.identity, now)) {
     return give_up({ErrorCode::rig, fmt::format("the run cannot be resumed on another rig: {}; "
                                                 "start a new run without --resume",
                                                 *other)});
   }
+  identified_ = true;
   return {};
 }
 

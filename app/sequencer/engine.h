@@ -1,7 +1,8 @@
 // Executes a plan: moves the head, waits until the output is at rest, takes the samples, commits.
 //
 // What is done about what goes wrong, each noted as an event:
-//   drive answers wrongly, late or not at all   connection made anew, the pose measured again
+//   drive answers wrongly, late or not at all   connection made anew, the pose measured again; at
+//       the start of a run tried attempts_per_pose times, of one that goes on for wait_s
 //   alarm, stall, limit, watchdog               stop, alarm reset, the pose measured again
 //   homing lost                                 homed again; the last committed pose is measured
 //       once more, and if it has changed, the poses since the homing before that are affected are
@@ -117,7 +118,8 @@ class Engine {
   Outcome<void> execute(const Plan& plan, const StartPoint& start);
   void prepare(const Plan& plan, const StartPoint& start);
   Outcome<void> start_up(const Plan& plan, const StartPoint& start);
-  Outcome<void> await_first_sample();
+  Outcome<void> await_first_sample(bool resumed);
+  Outcome<void> meet_drive(const Plan& plan, const StartPoint& start);
   Outcome<void> identify(const StartPoint& start);
   Outcome<void> compare_with_earlier(const StartPoint& start);
   const PlanStep* next_step(const Plan& plan, bool put_off) const;
@@ -142,6 +144,7 @@ class Engine {
   Outcome<void> hold(const std::string& reason);
   std::optional<std::string> reason_to_hold() const;
   Outcome<void> wait(std::chrono::milliseconds host_time);
+  Outcome<void> back_off(int attempt);
   Outcome<void> check_reference();
   Outcome<std::optional<std::string>> changed_since(long long step);
   Outcome<void> take_out(const std::vector<long long>& steps, const std::string& why);
@@ -197,6 +200,7 @@ class Engine {
   // The drive.
   rig::HeadStatus status_;
   bool head_answers_ = false;
+  bool identified_ = false;
   bool homed_ = false;  ///< by us: a drive that is not, is in trouble
   int approach_ = 0;    ///< direction of the last δ motion
   std::chrono::steady_clock::time_point next_poll_;

@@ -44,7 +44,7 @@ Engine::Outcome<void> Engine::recover(const std::string& reason, int attempt) {
   std::string said;
   for (int round = attempt;; ++round) {
     if (round > 1) {
-      if (auto waited = wait(backoff(round - 1)); !waited) return waited;
+      if (auto waited = back_off(round - 1); !waited) return waited;
     }
     auto done = try_to_recover();
     if (done || done.error().trouble != Trouble::repeat) return done;
@@ -84,7 +84,7 @@ Engine::Outcome<void> Engine::reconnect() {
       return {};
     }
     if (Clock::now() > limit) return give_up(connected.error().error);
-    if (auto waited = wait(backoff(attempt)); !waited) return waited;
+    if (auto waited = back_off(attempt); !waited) return waited;
   }
 }
 
@@ -116,9 +116,11 @@ Engine::Outcome<void> Engine::await_sensor() {
       return {};
     }
     if (Clock::now() > limit) return give_up(opened.error());
-    if (auto waited = wait(backoff(attempt)); !waited) return waited;
+    if (auto waited = back_off(attempt); !waited) return waited;
   }
 }
+
+Engine::Outcome<void> Engine::back_off(int attempt) { return wait(backoff(attempt)); }
 
 Engine::Outcome<void> Engine::wait(milliseconds host_time) {
   const auto until = Clock::now() + host_time;

@@ -80,6 +80,34 @@ TEST_F(SequencerRecovery, ARigThatStandsStillForAWhile) {
   EXPECT_THAT(events("retry"), Not(IsEmpty()));
 }
 
+TEST_F(SequencerRecovery, ADriveThatDoesNotAnswerAtOnceWhenTheRunStarts) {
+  start_rig(fault("modbus.exception", "code = 6\nafter = 1") + fault("modbus.reset", "after = 5"));
+  expect_finished(run());
+  EXPECT_THAT(events("retry"), Contains(HasSubstr("start, attempt 1")));
+  EXPECT_THAT(events("identity"), testing::SizeIs(1));
+}
+
+TEST_F(SequencerRecovery, ARigThatIsNotThereYetWhenARunGoesOn) {
+  start_rig();
+  const auto stopped = run(false, [&](const Progress& progress) {
+    if (progress.step == 3) control_.request_stop();
+  });
+  ASSERT_FALSE(stopped->outcome.has_value());
+  rig_.recovery.wait_s = 60;
+  rig_.head.response_timeout = milliseconds{300};
+  EngineControl control;
+  ASSERT_EQ(kill(simulated_->process(), SIGSTOP), 0);
+  std::thread wake([this] {
+    std::this_thread::sleep_for(milliseconds{1500});
+    kill(simulated_->process(), SIGCONT);
+  });
+  const auto session =
+      run_session({.rig = rig_, .database = database(), .resume = true}, control, {});
+  wake.join();
+  expect_finished(session);
+  EXPECT_THAT(events("retry"), Contains(HasSubstr("start")));
+}
+
 TEST_F(SequencerRecovery, EveryFaultOfTheDriveIsSurvived) {
   start_rig(fault("drive.stall", "axis = \"delta\"\nmove = 3\ndelay_s = 0.3") +
             fault("drive.alarm", "axis = \"h\"\ncode = 0x28\nmove = 6\ndelay_s = 0.1") +

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -29,6 +30,11 @@ std::string text_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
+/// What was built together lies together, also where a copy of it runs while work goes on.
+std::string binary(const std::string& name) {
+  return fs::read_symlink("/proc/self/exe").parent_path() / name;
+}
+
 constexpr const char* kWorld = R"(
 [unit]
 random = true
@@ -37,6 +43,11 @@ N = 1.0e-5
 )";
 
 }  // namespace
+
+double patience() {
+  const char* text = std::getenv("PLUMBLINE_BATTERY_PATIENCE");
+  return text == nullptr ? 1 : std::max(1.0, std::atof(text));
+}
 
 Folder::Folder(const std::string& parent) {
   std::string pattern = parent + "/plumbline-battery-XXXXXX";
@@ -58,24 +69,27 @@ Bench::Bench(const Folder& folder, RigChoice choice)
   U0_V_ = triad.U0_V;
   gamma_ = world->gravity.local_mps2 / kStandardGravity_mps2;
   adc_ = world->adc;
-  restart();
+  restart(choice_.world);
 }
 
-void Bench::restart() {
+void Bench::restart(const std::string& more_world) {
   rig_.reset();
-  auto rig = app::SimulatedRig::start({.world_toml = kWorld + choice_.world,
+  auto rig = app::SimulatedRig::start({.world_toml = kWorld + more_world,
                                        .speed = choice_.speed,
                                        .seed = choice_.seed,
                                        .rtu = choice_.rtu});
   if (!rig) throw std::runtime_error(rig.error().message);
   rig_ = std::make_unique<app::SimulatedRig>(*std::move(rig));
-  std::ofstream(config_)
-      << "[dut]\nserial = \"B-1\"\n[gravity]\nlocal_mps2 = 9.81012\n"
-      << "[head]\nmodbus = \"" << rig_->modbus() << "\"\npoll_interval_ms = 2\nwatchdog_ms = 1000\n"
-      << "response_timeout_ms = 200\nidentity_address = 0x200\nidentity_count = 4\n"
-      << "[sensor]\nsilence_timeout_ms = 100\ncan = \"" << rig_->can()
-      << "\"\nidentity = \"IDENT.Serial\"\n"
-      << choice_.plan;
+  const auto patient_ms = [](int value_ms) { return std::lround(value_ms * patience()); };
+  std::ofstream(config_) << "[dut]\nserial = \"B-1\"\n[gravity]\nlocal_mps2 = 9.81012\n"
+                         << "[head]\nmodbus = \"" << rig_->modbus()
+                         << "\"\npoll_interval_ms = 2\nwatchdog_ms = "
+                         << std::min(60000L, patient_ms(3000))
+                         << "\nresponse_timeout_ms = " << patient_ms(400)
+                         << "\nidentity_address = 0x200\nidentity_count = 4\n"
+                         << "[sensor]\nsilence_timeout_ms = " << patient_ms(400) << "\ncan = \""
+                         << rig_->can() << "\"\nidentity = \"IDENT.Serial\"\n"
+                         << choice_.plan;
 }
 
 double Bench::error_V(const storage::PoseRecord& pose) const {
@@ -96,7 +110,7 @@ double Bench::error_V(const storage::PoseRecord& pose) const {
 Program::Program(const Bench& bench, const fs::path& database, const Folder& folder, bool resume,
                  const std::map<std::string, std::string>& environment)
     : err_(folder / "err") {
-  std::vector<std::string> words = {std::string(PLUMBLINE_BINARY_DIR) + "/plumbline",
+  std::vector<std::string> words = {binary("plumbline"),
                                     "run",
                                     "--config",
                                     bench.config(),
@@ -207,6 +221,6 @@ Audit audit(const fs::path& database, const std::map<long long, std::string>& be
   return result;
 }
 
-std::string shim_path() { return std::string(PLUMBLINE_BINARY_DIR) + "/libplumbline_disk_shim.so"; }
+std::string shim_path() { return binary("libplumbline_disk_shim.so"); }
 
 }  // namespace plumbline::battery

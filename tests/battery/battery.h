@@ -17,6 +17,10 @@
 
 namespace plumbline::battery {
 
+/// PLUMBLINE_BATTERY_PATIENCE: all deadlines are so many times longer, for a machine that has little
+/// time for a battery. 1 without it.
+double patience();
+
 /// Removed at the end.
 class Folder {
  public:
@@ -42,8 +46,9 @@ struct RigChoice {
 class Bench {
  public:
   Bench(const Folder& folder, RigChoice choice);
-  /// Ends the simulated rig (if it lives) and starts it anew on other wires.
-  void restart();
+  /// Ends the simulated rig (if it lives) and starts it anew on other wires, with `more_world` in
+  /// place of what the choice appends.
+  void restart(const std::string& more_world);
   const app::SimulatedRig& rig() const { return *rig_; }
   std::filesystem::path config() const { return config_; }
   /// How far the mean of a pose is from the truth on its worst axis, in V.

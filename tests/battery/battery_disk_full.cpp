@@ -33,7 +33,7 @@ noise_V = 0.0001
 delta_deg = { start = 0, stop = 270, step = 90 }
 h_deg = { start = 0, stop = 20, step = 20 }
 [recovery]
-wait_s = 5
+wait_s = 60
 )";
 constexpr std::size_t kPoses = 9;
 

@@ -65,7 +65,7 @@ void check_end(const Ended& ended, Tally& tally, const std::string& when) {
 int systematic(int h_rows, int most, double speed) {
   const Folder folder;
   Bench bench(folder, {.world = "[node]\nrate_hz = 50\n",
-                       .plan = plan_of(h_rows) + "[recovery]\nwait_s = 20\n",
+                       .plan = plan_of(h_rows) + "[recovery]\nwait_s = 60\n",
                        .speed = speed});
   const auto database = folder / "run.db";
   Tally tally;
@@ -116,19 +116,23 @@ int systematic(int h_rows, int most, double speed) {
 
 int random_moments(int count, bool while_resuming, std::uint64_t seed, double speed) {
   const Folder folder;
-  Bench bench(folder, {.plan = small_plan() + "[recovery]\nwait_s = 20\n", .speed = speed});
+  Bench bench(folder, {.plan = small_plan() + "[recovery]\nwait_s = 60\n", .speed = speed});
   std::mt19937_64 random(seed);
   Tally tally;
   int kills = 0;
   int runs = 0;
   std::map<long long, std::string> kept;
+  // How long a run takes on this machine: the moments lie within.
+  const auto begin = std::chrono::steady_clock::now();
+  check_end(Program(bench, folder / "whole.db", folder, false).wait(), tally, "run without a kill");
+  const double run_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   auto database = folder / "run0.db";
   while (kills < count) {
     const bool resume = audit(database).any_run;
     Program program(bench, database, folder, resume);
-    // A run takes about 0.5 s of world time a pose and 30 s for the start, speeded up.
-    const double longest_ms = while_resuming && resume ? 40e3 / speed : 90e3 / speed;
-    const double wait_ms = std::uniform_real_distribution<double>(0, longest_ms + 60)(random);
+    const double longest_ms = (while_resuming && resume ? 0.6 : 1.1) * run_ms;
+    const double wait_ms = std::uniform_real_distribution<double>(0, longest_ms)(random);
     const auto until =
         std::chrono::steady_clock::now() + std::chrono::duration<double, std::milli>(wait_ms);
     while (program.running() && std::chrono::steady_clock::now() < until) {

@@ -5,12 +5,17 @@
 //   battery_wire drive  [--count N] [--seed S]
 //   battery_wire can    [--count N] [--seed S]
 #include <fmt/format.h>
+#include <signal.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <random>
+#include <string_view>
+#include <thread>
 
 #include "tests/battery/battery.h"
 
@@ -28,7 +33,7 @@ window = 10
 delta_deg = { start = 0, stop = 270, step = 90 }
 h_deg = { start = 0, stop = 40, step = 20 }
 [recovery]
-wait_s = 20
+wait_s = 60
 )";
 constexpr std::size_t kPoses = 13;
 /// Noise of 0.1 mV a sample and 20 samples: 0.02 mV; a wrong angle of 0.1° gives 0.06 mV.
@@ -43,12 +48,15 @@ struct Case {
   std::string world;
   std::string plan;
   bool may_fail = false;  ///< ending the run safely is right, too
+  std::map<std::string, std::string> environment;
+  bool resuming = false;  ///< the run is stopped half way and resumed in that world
 };
 
 struct Counts {
   int runs = 0;
   int finished = 0;
   int ended_safely = 0;
+  int noticed = 0;  ///< runs with a retry or a fault among their events
   int poses = 0;
   int wrong = 0;
   int faults = 0;
@@ -56,24 +64,37 @@ struct Counts {
 
 void run_case(const Case& one, double speed, bool rtu, std::uint64_t seed, Counts& counts) {
   const Folder folder;
-  Bench bench(
-      folder,
-      {.world = one.world, .plan = kPlan + one.plan, .speed = speed, .rtu = rtu, .seed = seed});
+  Bench bench(folder, {.world = one.resuming ? "" : one.world,
+                       .plan = kPlan + one.plan,
+                       .speed = speed,
+                       .rtu = rtu,
+                       .seed = seed});
   const auto database = folder / "run.db";
   const auto complain = [&](const std::string& what) {
     fmt::print("battery-wire: {} (seed {}): {}\n", one.name, seed, what);
     ++counts.faults;
   };
+  if (one.resuming) {
+    Program program(bench, database, folder, false);
+    while (program.running() && audit(database).poses.size() < kPoses / 2) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ::kill(program.process(), SIGTERM);
+    program.wait();
+    if (audit(database).state == storage::RunState::finished) return;  // it was quicker
+    bench.restart(one.world);
+  }
+  const bool resume = audit(database).any_run;
   const auto begin = std::chrono::steady_clock::now();
   Ended ended;
   {
-    Program program(bench, database, folder, false);
+    Program program(bench, database, folder, resume, one.environment);
     ended = program.wait();
   }
   const double took_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   ++counts.runs;
-  if (took_s > 120) complain(fmt::format("took {:.0f} s", took_s));
+  if (took_s > 120 * patience()) complain(fmt::format("took {:.0f} s", took_s));
   if (ended.code == 0 || ended.code == 1) {
     ++counts.finished;
   } else if (ended.code == 3 && one.may_fail) {
@@ -88,6 +109,11 @@ void run_case(const Case& one, double speed, bool rtu, std::uint64_t seed, Count
   }
   auto store = storage::RunStore::open_read_only(database);
   if (!store) return complain(store.error().message);
+  const auto events = store->load(1);
+  if (!events) return complain(events.error().message);
+  counts.noticed += std::any_of(events->events.begin(), events->events.end(), [](const auto& e) {
+    return e.kind == "retry" || e.kind == "fault";
+  });
   const auto poses = store->poses(1);
   if (!poses) return complain(poses.error().message);
   for (const storage::PoseRecord& pose : *poses) {
@@ -98,9 +124,6 @@ void run_case(const Case& one, double speed, bool rtu, std::uint64_t seed, Count
     complain(fmt::format("pose {} is {:.3f} mV off the truth", pose.ordinal, 1e3 * error_V));
   }
 }
-
-/// Requests of a run of this plan are about this many (start-up, homing, polls of every wait).
-constexpr int kRequests = 1500;
 
 Case modbus_case(int index, std::mt19937_64& random) {
   struct Kind {
@@ -114,7 +137,7 @@ Case modbus_case(int index, std::mt19937_64& random) {
                                         Kind{"modbus.exception", "code = 5"},
                                         Kind{"modbus.exception", "code = 6"},
                                         Kind{"modbus.silence", "count = 3"},
-                                        Kind{"modbus.late", "late_s = 0.25"},
+                                        Kind{"modbus.late", ""},
                                         Kind{"modbus.truncated", "bytes = 5"},
                                         Kind{"modbus.bad_crc", ""},
                                         Kind{"modbus.wrong_unit", ""},
@@ -122,14 +145,30 @@ Case modbus_case(int index, std::mt19937_64& random) {
                                         Kind{"modbus.reset", ""},
                                         Kind{"modbus.half_open", ""}};
   const Kind& kind = kKinds[static_cast<std::size_t>(index) % kKinds.size()];
-  // Before, between and after the motions: idle, homing, moving, settling, sampling.
-  const int after = std::uniform_int_distribution<int>(0, kRequests)(random);
+  const auto integer = [&](int low, int high) {
+    return std::uniform_int_distribution<int>(low, high)(random);
+  };
+  const auto real = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  const std::string rest = std::string_view(kind.name) == "modbus.late"
+                               ? fmt::format("late_s = {}", 0.5 * patience())
+                               : kind.rest;
+  const std::size_t phase = (static_cast<std::size_t>(index) + index / kKinds.size()) % 5;
+  const std::string when = std::array{
+      fmt::format("after = {}", integer(0, 12)),                                   // idle
+      fmt::format("after = {}", integer(20, 80)),                                  // homing
+      fmt::format("move = {}\ndelay_s = {:.2f}", integer(0, 12), real(0.1, 2)),    // moving
+      fmt::format("move = {}\ndelay_s = {:.2f}", integer(0, 12), real(3.4, 4.5)),  // sampling
+      fmt::format("after = {}", integer(0, 300))}[phase];                          // resuming
   Case one;
-  one.name = fmt::format("{} {} after {}", kind.name, kind.rest, after);
-  one.world = fault(kind.name, fmt::format("{}\nafter = {}", kind.rest, after));
-  one.plan = "";
-  // At the very start a person is at the rig: a fault there may end the run.
-  one.may_fail = after < 60;
+  one.name =
+      fmt::format("{} {} {} {}", kind.name, rest,
+                  std::array{"idle", "homing", "moving", "sampling", "resuming"}[phase], when);
+  one.world = fault(kind.name, fmt::format("{}\n{}", rest, when));
+  one.resuming = phase == 4;
+  // As often silent as the start of a new run is tried.
+  one.may_fail = phase == 0 && std::string_view(kind.name) == "modbus.silence";
   return one;
 }
 
@@ -170,7 +209,7 @@ Case can_case(int index, std::mt19937_64& random) {
       std::array{"x", "y", "z"}[std::uniform_int_distribution<std::size_t>(0, 2)(random)];
   const std::string trigger = fmt::format("move = {}\ndelay_s = {:.3f}\n", move, delay_s);
   Case one;
-  switch (index % 7) {
+  switch (index % 8) {
     case 0:
       one.name = fmt::format("loss of {:.2f} %", 100 * share);
       one.world = fault("can.loss", fmt::format("probability = {:.5f}", share));
@@ -188,7 +227,7 @@ Case can_case(int index, std::mt19937_64& random) {
     case 3:
       one.name = fmt::format("bus-off at move {}", move);
       one.world = fault("can.error_frame", "error_class = 0x40\n" + trigger) +
-                  fault("can.silence", trigger + "duration_s = 2");
+                  fault("can.silence", trigger + "duration_s = 40");
       break;
     case 4:
       one.name = fmt::format("{} stuck at move {}", axis, move);
@@ -200,9 +239,19 @@ Case can_case(int index, std::mt19937_64& random) {
       one.world =
           fault("can.saturation", trigger + fmt::format("axis = \"{}\"\nduration_s = 3", axis));
       break;
+    case 6: {
+      const int after = std::uniform_int_distribution<int>(0, 60)(random);
+      const char* by_s = index / 8 % 2 == 0 ? "3600" : "-3600";
+      one.name = fmt::format("time of day set by {} s after {} looks at it", by_s, after);
+      one.environment = {{"LD_PRELOAD", shim_path()},
+                         {"PLUMBLINE_CLOCK_STEP", by_s},
+                         {"PLUMBLINE_CLOCK_AFTER", std::to_string(after)}};
+      one.resuming = index / 16 % 2 == 1;
+      break;
+    }
     default:
-      one.name = fmt::format("10 s of silence at move {}", move);
-      one.world = fault("can.silence", trigger + "duration_s = 10");
+      one.name = fmt::format("a minute of silence at move {}", move);
+      one.world = fault("can.silence", trigger + "duration_s = 60");
   }
   return one;
 }
@@ -232,7 +281,7 @@ int main(int argc, char** argv) {
   Counts counts;
   for (int i = 0; i < count; ++i) {
     const Case one = modbus->parsed()
-                         ? (i % 15 == 14 ? swapped_words() : modbus_case(i % 15, random))
+                         ? (i % 15 == 14 ? swapped_words() : modbus_case(i - i / 15, random))
                      : drive->parsed() ? drive_case(i, random)
                                        : can_case(i, random);
     run_case(one, speed, rtu, seed + static_cast<std::uint64_t>(i), counts);
@@ -240,9 +289,10 @@ int main(int argc, char** argv) {
     std::fflush(stdout);
   }
   fmt::print(
-      "battery-wire {}: {} runs, {} finished, {} ended safely, {} poses accepted, {} of them "
-      "wrong, {} faults\n",
+      "battery-wire {}: {} runs, {} finished, {} ended safely, {} had to recover; {} poses "
+      "accepted, "
+      "{} of them wrong, {} faults\n",
       app.get_subcommands().front()->get_name(), counts.runs, counts.finished, counts.ended_safely,
-      counts.poses, counts.wrong, counts.faults);
+      counts.noticed, counts.poses, counts.wrong, counts.faults);
   return counts.faults == 0 ? 0 : 1;
 }

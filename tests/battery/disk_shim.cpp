@@ -1,13 +1,17 @@
-// A disk that kills or fails on request, under an unchanged program: LD_PRELOAD this library.
+// A disk that kills or fails on request, and a clock that is set, under an unchanged program:
+// LD_PRELOAD this library.
 //
 // Every write to, and sync of, a file whose name contains PLUMBLINE_DISK_FILES is one step; with
 // PLUMBLINE_DISK_SYNCS=1 only the syncs are. The N-th step from the start of the program
 //   PLUMBLINE_DISK_KILL=N    ends it with SIGKILL, before the step (N odd) or after it (N even)
 //   PLUMBLINE_DISK_FULL=N    and all after it fail with ENOSPC
+// PLUMBLINE_CLOCK_STEP=S sets the time of day S seconds on (or back) after it has been asked for
+// PLUMBLINE_CLOCK_AFTER times.
 // PLUMBLINE_DISK_COUNT=FILE receives the number of steps when the program ends by itself.
 #include <dlfcn.h>
 #include <signal.h>
 #include <sys/uio.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -29,6 +33,8 @@ struct Settings {
   bool syncs_only = number("PLUMBLINE_DISK_SYNCS") != 0;
   long kill_at = number("PLUMBLINE_DISK_KILL");
   long full_at = number("PLUMBLINE_DISK_FULL");
+  long clock_step_s = number("PLUMBLINE_CLOCK_STEP");
+  long clock_after = number("PLUMBLINE_CLOCK_AFTER");
 };
 
 const Settings& settings() {
@@ -37,6 +43,7 @@ const Settings& settings() {
 }
 
 std::atomic<long> steps{0};
+std::atomic<long> looks_at_clock{0};
 
 bool watched(int fd) {
   if (settings().files == nullptr) return false;
@@ -106,6 +113,15 @@ ssize_t pwrite(int fd, const void* data, size_t size, off_t at) {
 ssize_t write(int fd, const void* data, size_t size) {
   static const auto real = next<ssize_t (*)(int, const void*, size_t)>("write");
   return step(fd, false, [&] { return real(fd, data, size); });
+}
+
+time_t time(time_t* result) {
+  timespec now{};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  const bool is_set = ++looks_at_clock > settings().clock_after;
+  const time_t told = now.tv_sec + (is_set ? settings().clock_step_s : 0);
+  if (result != nullptr) *result = told;
+  return told;
 }
 
 }  // extern "C"
