@@ -10,6 +10,7 @@
 #include "estimator/effects/smooth_term.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/axis_tools.h"
+#include "estimator/fit/joint_filter.h"
 #include "estimator/noise/chi_squared.h"
 
 namespace plumbline {
@@ -53,25 +54,82 @@ AxisEstimate axis_of(const EnlargedFit& fit, std::size_t axis) {
   return {fit.parameters.twelve[axis], fit.covariance.block<4, 4>(at, at)};
 }
 
+/// Variance of a visit's mean but for the drifts, which are states of the filters.
+double own_variance_V2(const ExplainInput& input, const SearchResult& found, std::size_t axis,
+                       std::size_t visit) {
+  const PooledNoise& pooled = found.noise[axis];
+  const SampleWindow& window = input.windows[visit];
+  const double duration_s = window.step_s * static_cast<double>(window.count);
+  return pooled.power(kTermN) / duration_s + 2 * pooled.power(kTermQ) / (duration_s * duration_s) +
+         found.own_V2[axis](static_cast<Eigen::Index>(visit));
+}
+
+NoiseModel filter_noise(const ExplainInput& input, const SearchInput& search,
+                        const SearchResult& found, std::size_t axis) {
+  const double span_s = input.poses.back().t_mean_s - input.poses.front().t_arrival_s;
+  return in_filter_terms(search.noise[axis], input.processes, found.noise[axis], span_s);
+}
+
+/// Which error of the joint filter's head an effect is; nothing for other effects.
+std::optional<std::size_t> joint_state_of(const ActiveEffect& active) {
+  const std::string id = active.effect->id();
+  if (id == "rig.base_roll") return 0;
+  if (id == "rig.tilt_index") return 1;
+  if (id == "rig.axis_skew") return 2;
+  return std::nullopt;
+}
+
+/// All axes and the errors of the head in one filter, where the head has such errors; the other
+/// effects are taken away from the readings.
+std::optional<JointEstimate> joint_estimate(const ExplainInput& input, const SearchInput& search,
+                                            const SearchResult& found,
+                                            const PerAxis<Eigen::VectorXd>& predicted_V) {
+  JointFilterOptions options;
+  options.head_sd_rad = {0, 0, 0};
+  options.flicker_correlation_s = filter_options(input.poses).flicker_correlation_s;
+  EnlargedParameters head_alone = found.fit.parameters;
+  head_alone.effects.clear();
+  for (const ActiveEffect& active : found.fit.parameters.effects) {
+    const auto state = joint_state_of(active);
+    if (!state) continue;
+    options.head_sd_rad[*state] = JointFilterOptions{}.head_sd_rad[*state];
+    head_alone.effects.push_back(active);
+  }
+  if (head_alone.effects.empty()) return std::nullopt;
+  const auto head_V = predict_means_V(search.log, head_alone);
+  PerAxis<NoiseModel> noise;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    noise[axis] = filter_noise(input, search, found, axis);
+  std::vector<JointVisit> visits;
+  for (std::size_t k = 0; k < input.poses.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    JointVisit visit{
+        input.poses[k].t_mean_s, input.poses[k].pose.delta_deg, input.poses[k].pose.h_deg, {}, {}};
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      visit.mean_V[axis] =
+          found.observed.mean_V[axis](row) - (predicted_V[axis](row) - head_V[axis](row));
+      visit.variance_V2[axis] = own_variance_V2(input, found, axis, k);
+    }
+    visits.push_back(visit);
+  }
+  JointEstimate estimate = run_joint_filter(visits, search.log.gamma, noise, options);
+  if (!estimate.converged) return std::nullopt;
+  return estimate;
+}
+
 /// The filter on readings from which the effects are taken away.
 AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& search,
                              const SearchResult& found, const Eigen::VectorXd& effect_V,
                              std::size_t axis) {
-  const PooledNoise& pooled = found.noise[axis];
-  const double span_s = input.poses.back().t_mean_s - input.poses.front().t_arrival_s;
-  const NoiseModel noise = in_filter_terms(search.noise[axis], input.processes, pooled, span_s);
+  const NoiseModel noise = filter_noise(input, search, found, axis);
   EightStateFilter filter(noise, filter_options(input.poses), input.poses.front().t_arrival_s);
   for (std::size_t k = 0; k < input.poses.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
     filter.predict(input.poses[k].t_mean_s);
-    const SampleWindow& window = input.windows[k];
-    const double duration_s = window.step_s * static_cast<double>(window.count);
-    const double variance_V2 = pooled.power(kTermN) / duration_s +
-                               2 * pooled.power(kTermQ) / (duration_s * duration_s) +
-                               found.own_V2[axis](row);
     const Visit& visit = search.log.visits[k];
     filter.update(specific_force_g({visit.delta_rad, visit.h_rad}, search.log.gamma),
-                  found.observed.mean_V[axis](row) - effect_V(row), variance_V2);
+                  found.observed.mean_V[axis](row) - effect_V(row),
+                  own_variance_V2(input, found, axis, k));
   }
   return filter.parameters();
 }
@@ -145,13 +203,18 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
 
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   const auto n = std::ssize(input.poses);
+  const auto joint = joint_estimate(input, search, found, predicted_V);
   WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = mps2_per_V(found.fit.parameters, i);
     result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
-    result.final.ekf[i] = with_gravity(
-        filter_estimate(input, search, found, predicted_V[i] - twelve_V[i], i), gravity);
+    const auto first = 4 * static_cast<Eigen::Index>(i);
+    result.final.ekf[i] =
+        with_gravity(joint ? AxisEstimate{joint->value.segment<4>(first),
+                                          joint->covariance.block<4, 4>(first, first)}
+                           : filter_estimate(input, search, found, predicted_V[i] - twelve_V[i], i),
+                     gravity);
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
     const Eigen::VectorXd residual_mps2 = factor * (mean_V[i] - predicted_V[i]);
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
