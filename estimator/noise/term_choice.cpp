@@ -18,6 +18,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMarkovGain = 9;
 constexpr double kLowLimitGain = 4;
 constexpr double kHighLimitGain = 3;
+// Flicker that ends within the lowest coefficients rests on so few of them that chance brings the
+// limit in easily, and then B moves by its own size.
+constexpr double kLowestHighLimitGain = 10;
+constexpr double kFewPeriods = 200;
 constexpr double kQuantizationGain = 4;
 constexpr std::size_t kMostMarkov = 3;
 constexpr double kShortestTau = 5;        // samples; what is faster is the sensor's bandwidth
@@ -114,6 +118,8 @@ class Chooser {
     TermDescription result;
     result.shape = shape;
     result.quantization = quantization;
+    result.high_limit_gain =
+        shape.flicker_high_hz < kFewPeriods / duration_s_ ? kLowestHighLimitGain : kHighLimitGain;
     result.density.resize(shape.terms(), plain_.cols());
     result.density.topRows(plain_.rows()) = plain_;
     fill_shape(sums_, shape, result.density);
@@ -264,7 +270,7 @@ double TermDescription::score() const {
   if (quantization) score += kQuantizationGain;
   score += kMarkovGain * static_cast<double>(shape.markov_tau_s.size());
   if (shape.flicker_low_hz > 0) score += kLowLimitGain;
-  if (std::isfinite(shape.flicker_high_hz)) score += kHighLimitGain;
+  if (std::isfinite(shape.flicker_high_hz)) score += high_limit_gain;
   return score;
 }
 

@@ -5,8 +5,10 @@
 #include <sys/mount.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/app/example_set.h"
 #include "tests/app/json_schema.h"
@@ -172,6 +174,43 @@ TEST(Program, EvaluatesAnotherSet) {
   const auto foreign = evaluate(folder / "foreign.toml");
   EXPECT_EQ(foreign.exit_code, 2);
   EXPECT_THAT(foreign.err, HasSubstr("of unit T-1, the set of unit T-2"));
+}
+
+// The quadratic that the calibration found is taken off: without that, 8 mg would be left at the
+// top, of which the twelve parameters take up only a part.
+TEST(Program, CorrectsReadings) {
+  const TempFolder temp;
+  const fs::path folder = temp.path();
+  ExampleSet set;
+  set.quadratic_g_per_g2 = 0.05;
+  set.write(folder);
+  ASSERT_EQ(run_plumbline(calibrate_arguments(folder, folder / "out")).exit_code, 0);
+  const auto correct = [&](const std::string& calibration) {
+    return run_plumbline({"correct", "--calibration", folder / calibration, "--samples",
+                          folder / "samples.csv", "--config", folder / "run.toml", "--out",
+                          folder / "corrected.csv"});
+  };
+  const auto outcome = correct("out/result.json");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("effects applied: sensor.quadratic; left out: none"));
+  std::istringstream lines(text_of(folder / "corrected.csv"));
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_THAT(line, StartsWith("# specific force"));
+  std::getline(lines, line);
+  EXPECT_EQ(line, "t_s,ax_mps2,ay_mps2,az_mps2");
+  // The first pose, x up: 20 readings of noise 0.3 mV, 0.09 m/s².
+  double sum[3] = {};
+  for (int i = 0; i < 20; ++i) {
+    double t_s = 0, a[3] = {};
+    std::getline(lines, line);
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf", &t_s, &a[0], &a[1], &a[2]), 4) << line;
+    for (int axis = 0; axis < 3; ++axis) sum[axis] += a[axis] / 20;
+  }
+  EXPECT_NEAR(sum[0], 9.81, 0.12);
+  EXPECT_NEAR(sum[1], 0, 0.12);
+  EXPECT_NEAR(sum[2], 0, 0.12);
+  EXPECT_EQ(correct("nothing.json").exit_code, 2);
 }
 
 TEST(Program, IdentifiesNoise) {

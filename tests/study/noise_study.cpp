@@ -69,14 +69,17 @@ NoiseStudy study_noise(const NoiseCase& noise_case, int records, std::uint64_t f
     NoiseFigures& figures = study.term[i];
     figures.truth = values[i];
     double square = 0;
+    double fourth = 0;
     for (const RecordTerms& record : found) {
       const NoiseTerm& term = record.term[i];
       figures.mean += share * term.value;
       square += share * term.value * term.value;
+      fourth += share * std::pow(term.value, 4);
       figures.mean_u += share * term.u;
       figures.covered += std::abs(term.value - values[i]) <= 1.96 * term.u ? share : 0;
       figures.present += term.present ? share : 0;
     }
+    figures.power_sd = std::sqrt(std::max(0.0, fourth - square * square));
     figures.sd = std::sqrt(std::max(0.0, square - figures.mean * figures.mean));
   }
   for (const RecordTerms& record : found) {

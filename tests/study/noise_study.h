@@ -29,6 +29,7 @@ struct NoiseFigures {
   double truth = 0;
   double mean = 0;
   double sd = 0;
+  double power_sd = 0;  ///< of the coefficient's square: what the bound is about near zero
   double mean_u = 0;
   double covered = 0;  ///< share within 1.96 u
   double present = 0;  ///< share called present

@@ -27,16 +27,20 @@ int main(int argc, char** argv) {
     if (noise_case.name.find(only) == std::string::npos) continue;
     const NoiseStudy study = study_noise(noise_case, records, seed);
     fmt::print("\n{}, {} records\n", noise_case.name, records);
-    fmt::print("  term      truth       mean   sd/truth    bound    mean u/sd  covered  present\n");
+    fmt::print(
+        "  term      truth       mean   sd/truth   of power/2    bound    mean u/sd  covered  "
+        "present\n");
     for (std::size_t i = 0; i < kTermCount; ++i) {
       const NoiseFigures& term = study.term[i];
       const bool there = term.truth > 0;
       const double bound = i < 4 ? noise_case.bound[i] : 0;
-      fmt::print("  {:<4} {:>10.3g} {:>10.3g} {:>10} {:>8} {:>12.2f} {:>7.1f}% {:>7.1f}%\n",
-                 kTermName[i], term.truth, term.mean,
-                 there ? fmt::format("{:.2f} %", 100 * term.sd / term.truth) : "–",
-                 bound > 0 ? fmt::format("{:.2f} %", 100 * bound) : "–",
-                 term.sd > 0 ? term.mean_u / term.sd : 0.0, 100 * term.covered, 100 * term.present);
+      fmt::print(
+          "  {:<4} {:>10.3g} {:>10.3g} {:>10} {:>12} {:>8} {:>12.2f} {:>7.1f}% {:>7.1f}%\n",
+          kTermName[i], term.truth, term.mean,
+          there ? fmt::format("{:.2f} %", 100 * term.sd / term.truth) : "–",
+          there ? fmt::format("{:.2f} %", 50 * term.power_sd / (term.truth * term.truth)) : "–",
+          bound > 0 ? fmt::format("{:.2f} %", 100 * bound) : "–",
+          term.sd > 0 ? term.mean_u / term.sd : 0.0, 100 * term.covered, 100 * term.present);
     }
     fmt::print("  described {:.1f} %, with a line {:.1f} %, with a Gauss-Markov term {:.1f} %\n",
                100 * study.adequate, 100 * study.lines, 100 * study.markov);
