@@ -5,6 +5,8 @@
 #include <functional>
 #include <limits>
 
+#include "estimator/noise/noise_model.h"
+
 namespace plumbline {
 
 namespace {
@@ -18,10 +20,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMarkovGain = 9;
 constexpr double kLowLimitGain = 4;
 constexpr double kHighLimitGain = 3;
-// Flicker that ends within the lowest coefficients rests on so few of them that chance brings the
-// limit in easily, and then B moves by its own size.
-constexpr double kLowestHighLimitGain = 10;
-constexpr double kFewPeriods = 200;
+// Flicker that is barely seen has no limits to be seen: chance brings them in, and then B moves by
+// many times its own size. This much must 2·ln L fall without any flicker.
+constexpr double kClearFlicker = 12;
 constexpr double kQuantizationGain = 4;
 constexpr std::size_t kMostMarkov = 3;
 constexpr double kShortestTau = 5;        // samples; what is faster is the sensor's bandwidth
@@ -77,6 +78,7 @@ class Chooser {
   }
 
   TermChoice choose(bool quantization) {
+    falls_off_ = !quantization;
     TermDescription start = describe({}, false, nullptr);
     if (quantization) {
       const TermDescription with = describe({}, true, nullptr);
@@ -118,8 +120,6 @@ class Chooser {
     TermDescription result;
     result.shape = shape;
     result.quantization = quantization;
-    result.high_limit_gain =
-        shape.flicker_high_hz < kFewPeriods / duration_s_ ? kLowestHighLimitGain : kHighLimitGain;
     result.density.resize(shape.terms(), plain_.cols());
     result.density.topRows(plain_.rows()) = plain_;
     fill_shape(sums_, shape, result.density);
@@ -143,13 +143,16 @@ class Chooser {
         if (candidate.score() < best.score()) best = std::move(candidate);
       };
       const SpectrumShape& shape = now.shape;
-      if (shape.flicker_low_hz == 0) {
+      // Where the spectrum falls off at its end, such limits bend with it.
+      const bool limits = falls_off_ || shape.flicker_low_hz > 0 ||
+                          std::isfinite(shape.flicker_high_hz) || has_clear_flicker(now);
+      if (limits && shape.flicker_low_hz == 0) {
         const double high = std::min(shape.flicker_high_hz, flicker_top_hz_);
         consider(search(now, shape,
                         {std::log(1 / duration_s_), std::log(high / kNarrowestFlicker),
                          [](SpectrumShape& s, double v) { s.flicker_low_hz = v; }}));
       }
-      if (!std::isfinite(shape.flicker_high_hz)) {
+      if (limits && !std::isfinite(shape.flicker_high_hz)) {
         const double low = std::max(shape.flicker_low_hz, 1 / duration_s_);
         consider(search(now, shape,
                         {std::log(low * kNarrowestFlicker), std::log(flicker_top_hz_),
@@ -159,6 +162,17 @@ class Chooser {
       if (!(best.score() < now.score())) return now;
       now = polish(std::move(best));
     }
+  }
+
+  bool has_clear_flicker(const TermDescription& now) const {
+    constexpr unsigned kHoldB = 1U << kTermB;
+    if (!(now.fit.power(kTermB) > 0)) return false;
+    const unsigned held = kHoldB | (now.quantization ? 0 : kHoldQ);
+    VectorXd start = starting_powers(sums_, now.density, held);
+    start(kTermB) = 0;
+    if (!now.quantization) start(kTermQ) = 0;
+    if (!(start.sum() > 0)) return true;
+    return fit_powers(sums_, now.density, start, held).deviance > now.fit.deviance + kClearFlicker;
   }
 
   TermDescription with_markov(const TermDescription& now) {
@@ -250,6 +264,7 @@ class Chooser {
   Eigen::MatrixXd plain_;  ///< densities of Q, N, B, K without limits
   double duration_s_ = 0;
   double flicker_top_hz_ = 0;
+  bool falls_off_ = false;
   TermDescription without_markov_;
   std::vector<Tried> tried_;
 };
@@ -270,7 +285,7 @@ double TermDescription::score() const {
   if (quantization) score += kQuantizationGain;
   score += kMarkovGain * static_cast<double>(shape.markov_tau_s.size());
   if (shape.flicker_low_hz > 0) score += kLowLimitGain;
-  if (std::isfinite(shape.flicker_high_hz)) score += high_limit_gain;
+  if (std::isfinite(shape.flicker_high_hz)) score += kHighLimitGain;
   return score;
 }
 

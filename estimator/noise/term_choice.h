@@ -12,9 +12,8 @@ namespace plumbline {
 /// A choice of terms and its fit.
 struct TermDescription {
   SpectrumShape shape;
-  bool quantization = false;   ///< Q may differ from zero
-  double high_limit_gain = 0;  ///< that an upper limit of the flicker must earn
-  Eigen::MatrixXd density;     ///< shape_densities()
+  bool quantization = false;  ///< Q may differ from zero
+  Eigen::MatrixXd density;    ///< shape_densities()
   SpectrumFit fit;
 
   /// Of each bin, U².
