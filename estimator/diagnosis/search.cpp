@@ -172,12 +172,6 @@ double p_of_search(double log_p_local, double looks) {
   return std::max(-std::expm1(-looks * std::exp(log_p_local)), 1e-300);
 }
 
-/// log of the probability that noise alone gives a candidate this gain.
-double log_p_of(const Candidate& candidate, double gain, int dof) {
-  if (!candidate.of_one_coarse_reading) return log_chi_squared_tail(gain, dof);
-  return std::log(std::max(f_tail(gain / dof, dof, kDofOfCoarseReadings), 1e-300));
-}
-
 struct Scored {
   std::size_t candidate = 0;
   double log_p = 0;  ///< of its own test
@@ -233,6 +227,18 @@ class Search {
            kPricePerParameter * dof;
   }
 
+  /// log of the probability that noise alone gives a candidate this gain. A single reading of a
+  /// coarse converter strays further than Gaussian noise, but by no more than a step.
+  double log_p_of(std::size_t candidate, double gain, int dof, const EnlargedFit& with) const {
+    if (!list_.candidates[candidate].of_one_coarse_reading) return log_chi_squared_tail(gain, dof);
+    const auto before = predict_means_V(input_.log, stage_.fit.parameters);
+    const auto after = predict_means_V(input_.log, with.parameters);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      if ((after[i] - before[i]).lpNorm<Eigen::Infinity>() > input_.log.adc->lsb_V())
+        return log_chi_squared_tail(gain, dof);
+    return std::log(std::max(f_tail(gain / dof, dof, kDofOfCoarseReadings), 1e-300));
+  }
+
   EnlargedFit fit(const EnlargedParameters& parameters) const {
     return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
   }
@@ -282,8 +288,8 @@ class Search {
       EnlargedFit with =
           fit(with_effect(stage_.fit.parameters, list_.candidates[s.candidate].active()));
       if (!with.determined) continue;
-      const double log_p = log_p_of(list_.candidates[s.candidate], stage_.fit.chi2 - with.chi2,
-                                    gains.dof(s.candidate));
+      const double log_p =
+          log_p_of(s.candidate, stage_.fit.chi2 - with.chi2, gains.dof(s.candidate), with);
       const double score = log_p + (s.score - s.log_p);
       if (score < winner_score) {
         winner = &s;
@@ -381,8 +387,8 @@ class Search {
             fit(with_effect(without.parameters, list_.candidates[candidate].active()));
         if (!with.determined) continue;
         const double gained = stage_.fit.chi2 - with.chi2;
-        const double p = p_of_search(
-            log_p_of(list_.candidates[candidate], gained, gains.dof(candidate)), looks_);
+        const double p =
+            p_of_search(log_p_of(candidate, gained, gains.dof(candidate), with), looks_);
         if (p > options_.false_alarm || !adopt(with.parameters)) continue;
         move_to_back(k, candidate, p);
         return true;
@@ -393,13 +399,11 @@ class Search {
 
   /// An effect stands in the model once; a second pose, slip or step is another matter.
   bool is_chosen(const Candidate& candidate) const {
-    const auto infos = candidate.effect->parameters();
-    if (std::any_of(infos.begin(), infos.end(),
-                    [](const auto& info) { return info.role == ParameterRole::index; }))
-      return false;
-    return std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
-      return list_.candidates[k].family == candidate.family;
-    });
+    return !candidate.effect->repeats() &&
+           std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
+             return list_.candidates[k].effect == candidate.effect &&
+                    list_.candidates[k].axis == candidate.axis;
+           });
   }
 
   void move_to_back(std::size_t removed, std::size_t candidate, double p) {
@@ -469,8 +473,7 @@ class Search {
         const double cost = with.chi2 + price(candidate, std::max(1, gains.dof(candidate)));
         if (!(cost < stage_.fit.chi2 + spent - kClearly)) continue;
         const double p = p_of_search(
-            log_p_of(list_.candidates[candidate], without.chi2 - with.chi2, gains.dof(candidate)),
-            looks_);
+            log_p_of(candidate, without.chi2 - with.chi2, gains.dof(candidate), with), looks_);
         if (p > options_.false_alarm || !adopt(with.parameters)) continue;
         for (auto k = subset.rbegin(); k != subset.rend(); ++k) {
           chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(*k));

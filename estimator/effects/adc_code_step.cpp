@@ -8,6 +8,7 @@ class CodeStep final : public Effect {
  public:
   std::string id() const override { return "adc.code_step"; }
   Subject subject() const override { return Subject::sensor; }
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"c", "V", ParameterRole::amplitude}, {"at", "V", ParameterRole::shape}};
   }

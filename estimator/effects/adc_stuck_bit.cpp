@@ -11,6 +11,7 @@ class StuckBit final : public Effect {
  public:
   std::string id() const override { return "adc.stuck_bit"; }
   Subject subject() const override { return Subject::sensor; }
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"bit", "", ParameterRole::index}, {"value", "", ParameterRole::index}};
   }

@@ -74,6 +74,8 @@ class Effect {
   /// Sensor: the term `since_arrival_s` after the first sample of the visit, g.
   virtual double sample_term_g(const TermInput& input, const double* p,
                                double since_arrival_s) const;
+  /// Whether it may stand in a model more than once for one axis: at another pose, say.
+  virtual bool repeats() const { return false; }
   /// What belonged to one run only does not carry over to another set of the same unit.
   virtual bool carries_over() const { return true; }
 };

@@ -1,7 +1,14 @@
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
 namespace {
+
+// Where the head stood before the first visit, which nothing recorded says.
+enum Start { kUnknown, kFromZero, kLikeTheFirstTurn, kStarts };
 
 // Backlash of the spindle: δ += ±w/2 by the direction in which δ was approached.
 class Backlash final : public Effect {
@@ -9,9 +16,12 @@ class Backlash final : public Effect {
   std::string id() const override { return "rig.backlash"; }
   Subject subject() const override { return Subject::head; }
   std::vector<ParameterInfo> parameters() const override {
-    // way 0: the head goes the shorter way round; 1: it never passes 360°. Nothing recorded says
+    // way 0: the head goes the shorter way round; 1: it never passes 360°. start: how it came to
+    // its first angle: 0 with no play, 1 from δ = 0, 2 as in the first turn. Nothing recorded says
     // so.
-    return {{"w", "deg", ParameterRole::amplitude}, {"way", "", ParameterRole::index}};
+    return {{"w", "deg", ParameterRole::amplitude},
+            {"way", "", ParameterRole::index},
+            {"start", "", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     // Approached from one side only, backlash is a zero of the spindle.
@@ -23,15 +33,39 @@ class Backlash final : public Effect {
         backward |= visit.delta_direction[way] < 0;
         new_way |= visit.delta_direction[1] != visit.delta_direction[0];
       }
-      if (forward && backward && new_way)
-        starts.push_back({{effect::kSmallAngle_deg, static_cast<double>(way)}});
+      if (!forward || !backward || !new_way) continue;
+      std::vector<int> seen;  // starts that lead to the same direction are one
+      for (int start = 0; start < kStarts; ++start) {
+        const int direction = start_direction(log, 0, way, start);
+        if (std::find(seen.begin(), seen.end(), direction) != seen.end()) continue;
+        seen.push_back(direction);
+        starts.push_back(
+            {{effect::kSmallAngle_deg, static_cast<double>(way), static_cast<double>(start)}});
+      }
     }
     return starts;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.delta_rad +=
-        0.5 * p[0] * log.visits[visit].delta_direction[p[1] > 0.5 ? 1 : 0] * effect::kRadPerDeg;
+    const std::size_t way = p[1] > 0.5 ? 1 : 0;
+    int direction = log.visits[visit].delta_direction[way];
+    if (direction == 0)
+      direction = start_direction(log, visit, way, static_cast<int>(std::lround(p[2])));
+    head.delta_rad += 0.5 * p[0] * direction * effect::kRadPerDeg;
+  }
+
+ private:
+  static int start_direction(const VisitLog& log, std::size_t visit, std::size_t way, int start) {
+    if (start == kFromZero) {
+      const double from_zero = log.visits[visit].delta_rad;
+      const double turn = way == 0 ? std::remainder(from_zero, 2 * std::numbers::pi) : from_zero;
+      return turn > 0 ? 1 : (turn < 0 ? -1 : 0);
+    }
+    if (start == kLikeTheFirstTurn) {
+      for (const Visit& later : log.visits)
+        if (later.delta_direction[way] != 0) return later.delta_direction[way];
+    }
+    return 0;
   }
 };
 

@@ -11,6 +11,7 @@ class DeltaPeriodic final : public Effect {
  public:
   std::string id() const override { return "rig.delta_periodic"; }
   Subject subject() const override { return Subject::head; }
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"n", "", ParameterRole::index},
             {"c", "deg", ParameterRole::amplitude},

@@ -8,6 +8,7 @@ class IndexSlip final : public Effect {
  public:
   std::string id() const override { return "rig.index_slip"; }
   Subject subject() const override { return Subject::head; }
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"epsilon", "deg", ParameterRole::amplitude}, {"pose", "", ParameterRole::index}};
   }

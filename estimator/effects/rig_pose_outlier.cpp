@@ -8,6 +8,7 @@ class PoseOutlier final : public Effect {
  public:
   std::string id() const override { return "rig.pose_outlier"; }
   Subject subject() const override { return Subject::head; }
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"pose", "", ParameterRole::index},
             {"delta", "deg", ParameterRole::amplitude},

@@ -8,6 +8,7 @@ class BiasStep final : public Effect {
  public:
   std::string id() const override { return "sensor.bias_step"; }
   Subject subject() const override { return Subject::sensor; }
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"b", "g", ParameterRole::amplitude}, {"t0", "s", ParameterRole::index}};
   }

@@ -11,15 +11,20 @@ class Hysteresis final : public Effect {
   std::string id() const override { return "sensor.hysteresis"; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"w", "g", ParameterRole::amplitude}};
+    // start: how the head came to its first pose, which nothing recorded says: 0 without a trace,
+    // 1 from δ = h = 0.
+    return {{"w", "g", ParameterRole::amplitude}, {"start", "", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    return {{{effect::kSmallTerm}}};
+    return {{{effect::kSmallTerm, 0}}, {{effect::kSmallTerm, 1}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
-    if (input.visit == 0) return 0;
+    const bool from_zero = input.visit == 0 && p[1] > 0.5;
+    if (input.visit == 0 && !from_zero) return 0;
     const auto i = static_cast<Eigen::Index>(input.axis);
-    const double rise = input.a_g[input.visit](i) - input.a_g[input.visit - 1](i);
+    const double before_g =
+        from_zero ? Eigen::Vector3d(input.log.gamma, 0, 0)(i) : input.a_g[input.visit - 1](i);
+    const double rise = input.a_g[input.visit](i) - before_g;
     if (std::abs(rise) < 1e-9) return 0;
     return rise > 0 ? p[0] / 2 : -p[0] / 2;
   }

@@ -175,6 +175,7 @@ class Wave final : public FunctionOfDriver {
   Wave(DriverPointer driver, Target target, double least, double step, double most)
       : FunctionOfDriver(std::move(driver), target), least_(least), step_(step), most_(most) {}
 
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"start", "", ParameterRole::index},
             {"period", "", ParameterRole::shape},

@@ -95,14 +95,6 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     for (std::size_t i = 0; i < kAxisCount; ++i) visit.mean_V[i] = mean_of(samples.u_V[i], pose);
     log.visits.push_back(std::move(visit));
   }
-  // Before the first turn the head came from its home position, like for that turn.
-  for (std::size_t way = 0; way < direction.size(); ++way) {
-    const auto turned = std::find_if(log.visits.begin(), log.visits.end(),
-                                     [&](const Visit& v) { return v.delta_direction[way] != 0; });
-    if (turned == log.visits.end()) continue;
-    std::for_each(log.visits.begin(), turned,
-                  [&](Visit& v) { v.delta_direction[way] = turned->delta_direction[way]; });
-  }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     log.sample_sd_V[i] = white_scatter_V(set, i);
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);

@@ -23,7 +23,7 @@ struct Visit {
   std::size_t count = 0;   ///< samples
   double t_mean_s = 0;
   double temperature_K = 0;  ///< mean of T − T₀; 0 when not recorded
-  /// Sign of the last turn of δ that led here, 0 if δ never turned: [0] for a head that goes the
+  /// Sign of the last turn of δ that led here, 0 before the first one: [0] for a head that goes the
   /// shorter way round, [1] for one that goes from one commanded angle to the other within the
   /// turn.
   std::array<int, 2> delta_direction{};

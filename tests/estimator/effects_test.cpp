@@ -169,7 +169,7 @@ TEST(VisitLog, ApproachesByTheShorterWayRound) {
     for (auto& u : set.samples.u_V) u.push_back(0.1 * k);
   }
   const VisitLog log = make_visit_log(set, {});
-  EXPECT_EQ(log.visits[0].delta_direction[0], 1);  // like the first turn
+  EXPECT_EQ(log.visits[0].delta_direction[0], 0);  // nothing says how it came there
   EXPECT_EQ(log.visits[1].delta_direction[0], 1);
   EXPECT_EQ(log.visits[2].delta_direction[0], 1);
   EXPECT_EQ(log.visits[3].delta_direction[0], -1);
