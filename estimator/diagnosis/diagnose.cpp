@@ -135,8 +135,9 @@ void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
     for (FoundEffect& entry : found) {
       if (entry.id != id) continue;
       entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
-      merge_names(entry.alternatives,
-                  find_alternatives(input, diagnosed.candidates, responses, search, e));
+      if (!effect.certain())
+        merge_names(entry.alternatives,
+                    find_alternatives(input, diagnosed.candidates, responses, search, e));
     }
   }
   std::erase_if(found, [](const FoundEffect& f) { return f.id.starts_with("unlisted:"); });

@@ -155,7 +155,7 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
       const double gain = heldout_gain(heldout_mps2(heldout, partitions, without), with, floor_mps2,
                                        axes_of(removed));
       // One pose's own error cannot be predicted from other poses.
-      const bool own = removed.effect->id() == "rig.pose_outlier";
+      const bool own = removed.effect->id() == "rig.pose_outlier" || removed.effect->certain();
       if (gain > 0 || own) {
         gains.push_back(std::max(gain, 0.0));
         continue;

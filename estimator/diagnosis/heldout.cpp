@@ -15,12 +15,53 @@ Heldout::Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
                [&](std::size_t i) { inverse_[i] = inverse_from_factor(whitening.lower[i]); });
 }
 
+namespace {
+
+/// Places of the parameters that act linearly. Shapes keep their values when a block is left out:
+/// one that only this block determines would run away along its tangent, which no response does.
+std::vector<Eigen::Index> linear_parameters(const EnlargedFit& fit) {
+  std::vector<Eigen::Index> linear;
+  Eigen::Index row = 0;
+  for (; row < 4 * static_cast<Eigen::Index>(kAxisCount); ++row) linear.push_back(row);
+  for (const ActiveEffect& active : fit.parameters.effects) {
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!active.free[k]) continue;
+      if (infos[k].role != ParameterRole::shape) linear.push_back(row);
+      ++row;
+    }
+  }
+  return linear;
+}
+
+/// Covariance of some parameters when the others are known.
+Eigen::MatrixXd conditional_covariance(const Eigen::MatrixXd& covariance,
+                                       const std::vector<Eigen::Index>& kept) {
+  if (std::ssize(kept) == covariance.rows()) return covariance;
+  const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt();
+  const Eigen::MatrixXd correlation =
+      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd information =
+      correlation.ldlt().solve(Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
+  const Eigen::MatrixXd of_kept = information(kept, kept);
+  const Eigen::VectorXd kept_scale = scale(kept);
+  return kept_scale.asDiagonal() *
+         of_kept.ldlt().solve(Eigen::MatrixXd::Identity(std::ssize(kept), std::ssize(kept))) *
+         kept_scale.asDiagonal();
+}
+
+}  // namespace
+
 std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
     const EnlargedFit& fit, const std::vector<Blocks>& partitions) const {
   const Eigen::Index n = mean_V_[0].size();
-  const Eigen::Index p = fit.covariance.rows();
+  const std::vector<Eigen::Index> linear = linear_parameters(fit);
+  const Eigen::MatrixXd covariance = conditional_covariance(fit.covariance, linear);
+  const Eigen::Index p = covariance.rows();
+  // What nothing but the block determines would be divided by the little that rounding left of it.
+  const Eigen::VectorXd largest_shift = 10 * covariance.diagonal().cwiseSqrt();
   const auto predicted = predict_means_V(log_, fit.parameters);
-  const Eigen::MatrixXd jacobian = prediction_jacobian(log_, fit.parameters);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(log_, fit.parameters)(Eigen::all, linear);
   PerAxis<Eigen::MatrixXd> axis_jacobian, weighted_jacobian;
   PerAxis<Eigen::VectorXd> residual, weighted_residual;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -42,14 +83,15 @@ std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
       weighted.middleRows(at, size) = weighted_jacobian[i](block, Eigen::all);
       right.segment(at, size) = weighted_residual[i](block);
     }
-    Z -= weighted * fit.covariance * weighted.transpose();
+    Z -= weighted * covariance * weighted.transpose();
     // A parameter that only this block determines (one pose's own error) leaves Z singular; it
     // then keeps its value.
     const Eigen::VectorXd scale = Z.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     Eigen::MatrixXd scaled = scale.asDiagonal() * Z * scale.asDiagonal();
     scaled.diagonal().array() += 1e-9;
     const Eigen::VectorXd d = scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right)));
-    const Eigen::VectorXd shift = fit.covariance * (weighted.transpose() * d);
+    const Eigen::VectorXd shift =
+        (covariance * (weighted.transpose() * d)).cwiseMax(-largest_shift).cwiseMin(largest_shift);
     for (std::size_t i = 0; i < kAxisCount; ++i)
       heldout[i](block) = residual[i](block) + axis_jacobian[i](block, Eigen::all) * shift;
   };

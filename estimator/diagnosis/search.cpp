@@ -91,7 +91,8 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
     Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
     RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
-      if (!input.log.adc || samples < 2) return;
+      // A converter without one of its bits does not round as it should.
+      if (!input.log.adc || samples < 2 || !input.log.stuck_bits[i].empty()) return;
       free = free_of_rounding(input.observed.mean_V[i], expected_V, *input.log.adc,
                               input.log.sample_sd_V[i], samples);
       mean_V = free.mean_V;
@@ -211,6 +212,8 @@ class Search {
   }
 
   SearchResult run() {
+    for (std::size_t c = 0; c < list_.candidates.size(); ++c)
+      if (list_.candidates[c].effect->certain()) adopt_proven(c);
     while (chosen_.size() < options_.max_effects && (add_one() || add_slow_one()))
       drop_superfluous();
     while (exchange_one()) drop_superfluous();
@@ -241,6 +244,41 @@ class Search {
 
   EnlargedFit fit(const EnlargedParameters& parameters) const {
     return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
+  }
+  /// The model with one more effect. A shape that the visits do not determine from where it ended
+  /// up (a boundary between two readings) stays there.
+  EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const {
+    EnlargedFit with = fit(with_effect(model, active));
+    if (with.determined) return with;
+    EnlargedParameters held = with.parameters;
+    ActiveEffect& newcomer = held.effects.back();
+    const auto infos = newcomer.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (infos[k].role == ParameterRole::shape) newcomer.free[k] = false;
+    return fit(held);
+  }
+  /// What the codes prove joins the model. Its response may hang on the level of the axis more
+  /// finely than the level is known without it, so the level is searched for.
+  void adopt_proven(std::size_t candidate) {
+    constexpr int kLevels = 16;
+    const Candidate& proven = list_.candidates[candidate];
+    EnlargedParameters best = with_effect(stage_.fit.parameters, proven.active());
+    const Eigen::VectorXd change = predict_means_V(input_.log, best)[proven.axis] -
+                                   predict_means_V(input_.log, stage_.fit.parameters)[proven.axis];
+    const double swing_V = change.maxCoeff() - change.minCoeff();
+    double best_chi2 = std::numeric_limits<double>::infinity();
+    const EnlargedParameters start = best;
+    for (int level = -kLevels; level <= kLevels; ++level) {
+      EnlargedParameters shifted = start;
+      shifted.twelve[proven.axis](3) += swing_V * level / kLevels;
+      const EnlargedFit with = fit(shifted);
+      if (!with.determined || !(with.chi2 < best_chi2)) continue;
+      best_chi2 = with.chi2;
+      best = with.parameters;
+    }
+    if (!adopt(best)) return;
+    chosen_.push_back(candidate);
+    p_values_.push_back(kProven);
   }
   EnlargedFit fit_without(const std::vector<std::size_t>& removed) const {
     EnlargedParameters fewer = stage_.fit.parameters;
@@ -285,8 +323,7 @@ class Search {
     double winner_score = std::numeric_limits<double>::infinity(), winner_log_p = 0;
     for (std::size_t k = 0; k < std::min(kRefined, ranked.size()); ++k) {
       const Scored& s = ranked[k];
-      EnlargedFit with =
-          fit(with_effect(stage_.fit.parameters, list_.candidates[s.candidate].active()));
+      EnlargedFit with = fit_with(stage_.fit.parameters, list_.candidates[s.candidate].active());
       if (!with.determined) continue;
       const double log_p =
           log_p_of(s.candidate, stage_.fit.chi2 - with.chi2, gains.dof(s.candidate), with);
@@ -383,8 +420,7 @@ class Search {
       const std::size_t candidate = ranked[r].candidate;
       for (std::size_t k = 0; k < chosen_.size(); ++k) {
         const EnlargedFit without = fit_without({k});
-        const EnlargedFit with =
-            fit(with_effect(without.parameters, list_.candidates[candidate].active()));
+        const EnlargedFit with = fit_with(without.parameters, list_.candidates[candidate].active());
         if (!with.determined) continue;
         const double gained = stage_.fit.chi2 - with.chi2;
         const double p =
@@ -399,6 +435,7 @@ class Search {
 
   /// An effect stands in the model once; a second pose, slip or step is another matter.
   bool is_chosen(const Candidate& candidate) const {
+    if (candidate.effect->certain()) return true;  // in the model from the start
     return !candidate.effect->repeats() &&
            std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
              return list_.candidates[k].effect == candidate.effect &&
@@ -423,6 +460,7 @@ class Search {
   /// What a newcomer has made superfluous goes.
   void drop_superfluous() {
     for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
+      if (list_.candidates[chosen_[k]].effect->certain()) continue;
       const EnlargedFit without = fit_without({k});
       if (!without.determined || p_of_removal(without) < options_.false_alarm) continue;
       if (!adopt(without.parameters)) continue;
@@ -450,6 +488,10 @@ class Search {
     for (std::size_t k = 0; k < chosen_.size(); ++k)
       for (std::size_t l = k + 1; l < chosen_.size(); ++l) subsets.push_back({k, l});
     for (const std::vector<std::size_t>& subset : subsets) {
+      if (std::any_of(subset.begin(), subset.end(), [&](std::size_t k) {
+            return list_.candidates[chosen_[k]].effect->certain();
+          }))
+        continue;
       const EnlargedFit without = fit_without(subset);
       if (!without.determined) continue;
       double spent = 0;
@@ -467,8 +509,12 @@ class Search {
             list_.candidates[candidate].hypothesis.p ==
                 list_.candidates[chosen_[subset.front()]].hypothesis.p)
           continue;
-        const EnlargedFit with =
-            fit(with_effect(without.parameters, list_.candidates[candidate].active()));
+        if (is_chosen(list_.candidates[candidate]) &&
+            std::none_of(subset.begin(), subset.end(), [&](std::size_t k) {
+              return list_.candidates[chosen_[k]].effect == list_.candidates[candidate].effect;
+            }))
+          continue;
+        const EnlargedFit with = fit_with(without.parameters, list_.candidates[candidate].active());
         if (!with.determined) continue;
         const double cost = with.chi2 + price(candidate, std::max(1, gains.dof(candidate)));
         if (!(cost < stage_.fit.chi2 + spent - kClearly)) continue;
@@ -501,6 +547,7 @@ class Search {
     return result;
   }
 
+  static constexpr double kProven = 1e-300;  ///< what the codes prove needs no search
   static constexpr int kMostExchanges = 4;
   const SearchInput& input_;
   const CandidateList& list_;

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
@@ -14,18 +16,20 @@ class CodeStep final : public Effect {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
-    constexpr int kBoundaries = 64;
     const double low = log.lowest_V[axis], high = log.highest_V[axis];
-    for (int k = 1; k < kBoundaries; ++k) {
-      starts.push_back({{1e-5, low + (high - low) * k / kBoundaries}});
+    // Noise rounds the step off over some of its standard deviations.
+    const double fitting = (high - low) / std::max(1.5 * log.input_sd_V[axis], 1e-9);
+    const int boundaries = static_cast<int>(std::clamp(fitting, 64.0, 200.0));
+    for (int k = 1; k < boundaries; ++k) {
+      starts.push_back({{1e-5, low + (high - low) * k / boundaries}});
     }
     return starts;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double at_V = p[1];
-    return p[0] / input.K_V_per_g *
-           effect::mean_over_noise([at_V](double u) { return u >= at_V ? 1.0 : -1.0; },
-                                   input.output_V, input.log.sample_sd_V[input.axis]);
+    const double below =
+        effect::share_below(at_V, input.output_V, input.log.input_sd_V[input.axis]);
+    return p[0] / input.K_V_per_g * (1 - 2 * below);
   }
 };
 

@@ -11,21 +11,28 @@ class Quantization final : public Effect {
   std::string id() const override { return "adc.quantization"; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"lsb", "V", ParameterRole::shape}};
+    return {{"lsb", "V", ParameterRole::shape}, {"origin", "V", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    const double step_V = log.smallest_step_V[axis];
-    const bool declared = log.adc && step_V < 1.5 * log.adc->lsb_V();
+    // Without a declared converter the smallest difference between two readings is its step.
+    const std::optional<Lattice> lattice =
+        log.adc ? log.coarser_lattice[axis]
+                : std::optional(Lattice{log.smallest_step_V[axis], log.lowest_V[axis]});
     // Noise of more than a step hides rounding from the means.
-    if (declared || step_V == 0 || log.sample_sd_V[axis] > 0.7 * step_V) return {};
-    return {{{step_V}}};
+    if (!lattice || lattice->step_V == 0 || log.input_sd_V[axis] > 0.7 * lattice->step_V) return {};
+    return {{{lattice->step_V, lattice->origin_V}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double lsb_V = p[0];
-    return effect::mean_over_noise(
-               [lsb_V](double u_V) { return std::round(u_V / lsb_V) * lsb_V - u_V; },
-               input.output_V, input.log.sample_sd_V[input.axis]) /
-           input.K_V_per_g;
+    const double sd = input.log.input_sd_V[input.axis] / lsb_V;
+    const double value = (input.output_V - p[1]) / lsb_V;  // in steps, as all of this
+    const double nearest = std::round(value);
+    double rounded = nearest;
+    for (double edge = 0.5; edge < 1 + effect::kReach * sd; ++edge) {
+      rounded += 1 - effect::share_below(nearest + edge, value, sd);
+      rounded -= effect::share_below(nearest - edge, value, sd);
+    }
+    return (rounded - value) * lsb_V / input.K_V_per_g;
   }
 };
 

@@ -1,5 +1,4 @@
 #include <cmath>
-#include <cstdint>
 
 #include "estimator/effects/effect.h"
 
@@ -7,7 +6,7 @@ namespace plumbline {
 namespace {
 
 // One bit of the code held at 0 or 1.
-class StuckBit final : public Effect {
+class StuckBitEffect final : public Effect {
  public:
   std::string id() const override { return "adc.stuck_bit"; }
   Subject subject() const override { return Subject::sensor; }
@@ -15,36 +14,37 @@ class StuckBit final : public Effect {
   std::vector<ParameterInfo> parameters() const override {
     return {{"bit", "", ParameterRole::index}, {"value", "", ParameterRole::index}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    if (!log.adc) return {};
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
-    for (int bit = 0; bit < log.adc->bits; ++bit) {
-      starts.push_back({{static_cast<double>(bit), 0}});
-      starts.push_back({{static_cast<double>(bit), 1}});
-    }
+    for (const StuckBit& stuck : log.stuck_bits[axis])
+      starts.push_back({{static_cast<double>(stuck.bit), stuck.value ? 1.0 : 0.0}});
     return starts;
   }
+  bool certain() const override { return true; }
   double term_g(const TermInput& input, const double* p) const override {
     const Adc& adc = *input.log.adc;
-    const auto bit = std::int64_t{1} << static_cast<int>(p[0]);
+    // In units of the bit, counted from the lower end of the span: codes with the bit set begin at
+    // odd numbers.
+    const double size_V = adc.lsb_V() * std::ldexp(1.0, static_cast<int>(p[0]));
+    const double half_code = 0.5 * adc.lsb_V() / size_V;
+    const double value = (input.output_V - adc.min_V) / size_V + half_code;
+    const double sd = input.log.input_sd_V[input.axis] / size_V;
     const bool set = p[1] > 0.5;
-    // The bits of the code counted from the lower end of the span.
-    const auto shift_V = [&](double u_V) {
-      const auto code =
-          static_cast<std::int64_t>(std::floor((u_V - adc.min_V) / adc.lsb_V() + 0.5));
-      const bool is_set = (code & bit) != 0;
-      if (is_set == set) return 0.0;
-      return (set ? 1.0 : -1.0) * static_cast<double>(bit) * adc.lsb_V();
-    };
-    return effect::mean_over_noise(shift_V, input.output_V, input.log.sample_sd_V[input.axis]) /
-           input.K_V_per_g;
+    double wrong = 0;
+    for (double from = std::floor(value - effect::kReach * sd); from <= value + effect::kReach * sd;
+         ++from) {
+      const bool is_set = std::fmod(std::abs(from), 2) == 1;
+      if (is_set == set) continue;
+      wrong += effect::share_below(from + 1, value, sd) - effect::share_below(from, value, sd);
+    }
+    return (set ? wrong : -wrong) * size_V / input.K_V_per_g;
   }
 };
 
 }  // namespace
 
 const Effect& adc_stuck_bit() {
-  static const StuckBit instance;
+  static const StuckBitEffect instance;
   return instance;
 }
 

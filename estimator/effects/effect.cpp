@@ -1,6 +1,7 @@
 #include "estimator/effects/effect.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace plumbline {
 
@@ -13,6 +14,11 @@ double Effect::sample_term_g(const TermInput& input, const double* p, double) co
 }
 
 namespace effect {
+
+double share_below(double edge, double value, double sd) {
+  if (!(sd > 0)) return value < edge ? 1 : 0;
+  return 0.5 * std::erfc((value - edge) / (sd * std::numbers::sqrt2));
+}
 
 double mean_decay(const Visit& visit, double origin_s, double tau_s) {
   const double first = std::exp(-(visit.t_arrival_s - origin_s) / tau_s);

@@ -74,6 +74,8 @@ class Effect {
   /// Sensor: the term `since_arrival_s` after the first sample of the visit, g.
   virtual double sample_term_g(const TermInput& input, const double* p,
                                double since_arrival_s) const;
+  /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
+  virtual bool certain() const { return false; }
   /// Whether it may stand in a model more than once for one axis: at another pose, say.
   virtual bool repeats() const { return false; }
   /// What belonged to one run only does not carry over to another set of the same unit.
@@ -92,12 +94,15 @@ inline constexpr double kSmallAngle_deg = 0.02;
 double mean_decay(const Visit& visit, double origin_s, double tau_s);
 /// `count` values from `first` to `last` in equal ratios.
 std::vector<double> geometric(double first, double last, int count);
+/// Share of Gaussian noise of standard deviation `sd` about `value` that lies below `edge`; with no
+/// noise 0 or 1.
+double share_below(double edge, double value, double sd);
+inline constexpr double kReach = 6;  ///< standard deviations beyond which noise does not come
 /// Mean of f(u + noise) over Gaussian noise of standard deviation `sd`: what averaging many
-/// readings leaves of a step in f.
+/// readings leaves of a kink in f. Where f jumps, share_below() is smooth and this is not.
 template <class Function>
 double mean_over_noise(Function f, double u, double sd) {
-  // Midpoints of equal parts of the normal distribution: robust where f jumps, unlike
-  // Gauss–Hermite.
+  // Midpoints of equal parts of the normal distribution: robust at kinks, unlike Gauss–Hermite.
   static constexpr double kQuantile[] = {-1.959964, -1.439531, -1.150349, -0.934589, -0.755415,
                                          -0.597760, -0.453762, -0.318639, -0.189118, -0.062707,
                                          0.062707,  0.189118,  0.318639,  0.453762,  0.597760,

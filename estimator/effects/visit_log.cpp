@@ -31,6 +31,41 @@ double smallest_step(std::vector<double> u) {
   return step;
 }
 
+/// White noise of one reading from the quietest quarter of the dwells, which no faulty bit
+/// disturbs.
+double quiet_scatter_V(const MeasurementSet& set, std::size_t axis) {
+  const std::vector<double>& u_V = set.samples.u_V[axis];
+  std::vector<double> variance_V2;
+  double readings = 0;
+  for (const Pose& pose : set.poses) {
+    if (pose.count < 2) continue;
+    const Eigen::Map<const Eigen::ArrayXd> dwell(u_V.data() + pose.first,
+                                                 static_cast<Eigen::Index>(pose.count));
+    variance_V2.push_back((dwell - dwell.mean()).square().sum() /
+                          static_cast<double>(pose.count - 1));
+    readings = static_cast<double>(pose.count);
+  }
+  if (variance_V2.empty()) return 0;
+  const auto quarter = variance_V2.begin() + std::ssize(variance_V2) / 4;
+  std::nth_element(variance_V2.begin(), quarter, variance_V2.end());
+  // Quartile of χ²/dof (Wilson & Hilferty, 1931).
+  const double spread = 2 / (9 * (readings - 1));
+  return std::sqrt(*quarter / std::pow(1 - spread - 0.674 * std::sqrt(spread), 3));
+}
+
+/// White noise before the converter.
+double input_scatter_V(const MeasurementSet& set, const VisitLog& log, std::size_t axis) {
+  const double lsb_V = log.adc->lsb_V();
+  if (log.stuck_bits[axis].empty()) {
+    const auto& lattice = log.coarser_lattice[axis];
+    return sd_before_rounding_V(lattice ? lattice->step_V : lsb_V, log.sample_sd_V[axis]);
+  }
+  // Without its lowest bit a converter has steps of twice the size.
+  if (log.stuck_bits[axis].front().bit == 0)
+    return sd_before_rounding_V(2 * lsb_V, log.sample_sd_V[axis]);
+  return sd_before_rounding_V(lsb_V, quiet_scatter_V(set, axis));
+}
+
 }  // namespace
 
 Eigen::MatrixXd dwell_contrasts(std::size_t samples) {
@@ -96,7 +131,12 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.visits.push_back(std::move(visit));
   }
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    log.sample_sd_V[i] = white_scatter_V(set, i);
+    log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
+    if (log.adc) {
+      log.stuck_bits[i] = stuck_bits(samples.u_V[i], *log.adc);
+      log.coarser_lattice[i] = coarser_lattice(samples.u_V[i], *log.adc);
+      log.input_sd_V[i] = input_scatter_V(set, log, i);
+    }
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);
     const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
     log.lowest_V[i] = *low;

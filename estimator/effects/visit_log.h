@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/effects/code_evidence.h"
 #include "estimator/kinematics.h"
 #include "estimator/measurement.h"
 
@@ -38,8 +39,12 @@ struct VisitLog {
   bool has_temperature = false;
   std::vector<std::string> covariate_names;  ///< in the order of Visit::covariate
   PerAxis<double> sample_sd_V{};             ///< white noise of one sample, within the dwells
-  PerAxis<double> smallest_step_V{};         ///< smallest difference between two different readings
-  PerAxis<double> lowest_V{}, highest_V{};   ///< of all readings
+  /// The same before the converter: freed of what rounding and stuck bits do to it.
+  PerAxis<double> input_sd_V{};
+  PerAxis<std::vector<StuckBit>> stuck_bits;        ///< that the codes show
+  PerAxis<std::optional<Lattice>> coarser_lattice;  ///< than declared, that the codes show
+  PerAxis<double> smallest_step_V{};        ///< smallest difference between two different readings
+  PerAxis<double> lowest_V{}, highest_V{};  ///< of all readings
   std::optional<Adc> adc;
   /// dwell_contrasts() of every number of samples that occurs.
   std::map<std::size_t, Eigen::MatrixXd> contrasts;

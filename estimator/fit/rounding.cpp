@@ -56,6 +56,10 @@ double rounded_variance(double value, double sigma, double slow) {
 
 }  // namespace
 
+double sd_before_rounding_V(double step_V, double recorded_V) {
+  return std::sqrt(noise_before_rounding_V2(step_V, recorded_V * recorded_V));
+}
+
 bool is_coarse_against(const Adc& adc, double sample_sd_V) {
   constexpr double kNoTrace = 0.7;  // of a step: 6e-5 of it are left
   const double step_V = adc.lsb_V();

@@ -1,0 +1,90 @@
+#include "estimator/effects/code_evidence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace plumbline {
+namespace {
+
+/// The different codes, ascending.
+std::vector<std::int64_t> codes_seen(const std::vector<double>& u_V, const Adc& adc) {
+  std::vector<std::int64_t> codes;
+  codes.reserve(u_V.size());
+  for (const double u : u_V) codes.push_back(std::llround((u - adc.min_V) / adc.lsb_V()));
+  std::sort(codes.begin(), codes.end());
+  codes.erase(std::unique(codes.begin(), codes.end()), codes.end());
+  return codes;
+}
+
+}  // namespace
+
+std::vector<StuckBit> stuck_bits(const std::vector<double>& u_V, const Adc& adc) {
+  constexpr std::size_t kEnough = 12;  // different codes that agree by chance once in 4000
+  const std::vector<std::int64_t> codes = codes_seen(u_V, adc);
+  std::vector<StuckBit> stuck;
+  if (codes.size() < kEnough) return stuck;
+  const std::int64_t range = codes.back() - codes.front();
+  std::int64_t always = ~std::int64_t{0}, ever = 0;
+  for (const std::int64_t code : codes) {
+    always &= code;
+    ever |= code;
+  }
+  int low_run = 0;  // neighbouring stuck bits from the lowest on
+  for (int bit = 0; bit < adc.bits; ++bit) {
+    const std::int64_t mask = std::int64_t{1} << bit;
+    if (range < 4 * mask) break;
+    if ((always & mask) == 0 && (ever & mask) != 0) continue;
+    stuck.push_back({bit, (always & mask) != 0});
+    if (low_run == bit && stuck.front().value == stuck.back().value) ++low_run;
+  }
+  if (low_run > 1) stuck.erase(stuck.begin(), stuck.begin() + low_run);
+  return stuck;
+}
+
+std::optional<Lattice> coarser_lattice(const std::vector<double>& u_V, const Adc& adc) {
+  constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
+  constexpr double kChance = 1e-9;
+  const std::vector<std::int64_t> codes = codes_seen(u_V, adc);
+  if (codes.size() < 5) return {};
+  // In declared steps from the lowest code. Rounding twice leaves half a step either way.
+  const double range = static_cast<double>(codes.back() - codes.front());
+  const double tolerance = 1.05;
+  const double resolution = 0.15 / range;
+  struct Fit {
+    bool good = false;
+    double middle = 0;  // of the remainders
+  };
+  const auto fit = [&](double step) {
+    double low = 0, high = 0;
+    for (const std::int64_t code : codes) {
+      const double off = std::remainder(static_cast<double>(code - codes.front()), step);
+      low = std::min(low, off);
+      high = std::max(high, off);
+      if (high - low > tolerance) return Fit{};
+    }
+    return Fit{true, 0.5 * (low + high)};
+  };
+  // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
+  // enough to be told from chance.
+  double first = 0, last = 0;
+  for (double step = std::min(kCoarsest, range / 4); step > kFinest; step *= 1 - resolution) {
+    if (fit(step).good) {
+      if (first == 0) first = step;
+      last = step;
+    } else if (first > 0) {
+      break;
+    }
+  }
+  if (first == 0) return {};
+  const double step = 0.5 * (first + last);
+  const double looks = std::log(kCoarsest / kFinest) / resolution;
+  const double log_chance = std::log(looks) - static_cast<double>(codes.size() - 2) *
+                                                  std::log(std::max(1.0, step / tolerance));
+  if (log_chance > std::log(kChance)) return {};
+  const double lsb_V = adc.lsb_V();
+  return Lattice{step * lsb_V,
+                 adc.min_V + lsb_V * (static_cast<double>(codes.front()) + fit(step).middle)};
+}
+
+}  // namespace plumbline
