@@ -78,6 +78,8 @@ std::optional<Lattice> coarser_lattice(const std::vector<double>& u_V, const Adc
   }
   if (first == 0) return {};
   const double step = 0.5 * (first + last);
+  // Between its points a lattice leaves codes out.
+  if (static_cast<double>(codes.size()) > range / step + 2) return {};
   const double looks = std::log(kCoarsest / kFinest) / resolution;
   const double log_chance = std::log(looks) - static_cast<double>(codes.size() - 2) *
                                                   std::log(std::max(1.0, step / tolerance));
