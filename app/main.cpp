@@ -68,6 +68,7 @@ int run(int argc, char** argv) {
   add_ctl(program, invocation);
   add_jobs(program, invocation);
   add_doctor(program, invocation);
+  add_serve(program, invocation);
   add_verify(program, invocation);
   add_help(program, invocation);
 

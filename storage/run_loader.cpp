@@ -194,15 +194,6 @@ Result<void> load_poses(const Database& database, const Adc& adc, StoredRun& run
   return {};
 }
 
-Result<void> load_events(const Database& database, StoredRun& run) {
-  return database.each(
-      "SELECT t_s, utc, kind, text FROM event WHERE run = ?1 ORDER BY id",
-      [&](const Statement& row) {
-        run.events.push_back({row.real(0), row.text(1), row.text(2), row.text(3)});
-      },
-      run.summary.id);
-}
-
 }  // namespace
 
 PoseKind pose_kind_from(const std::string& text) {
@@ -250,6 +241,18 @@ Result<void> each_pose(const Database& database, RunId run,
       run);
 }
 
+Result<std::vector<EventRecord>> list_events(const Database& database, RunId run) {
+  std::vector<EventRecord> events;
+  const auto done = database.each(
+      "SELECT t_s, utc, kind, text FROM event WHERE run = ?1 ORDER BY id",
+      [&](const Statement& row) {
+        events.push_back({row.real(0), row.text(1), row.text(2), row.text(3)});
+      },
+      run);
+  if (!done) return fail(done.error());
+  return events;
+}
+
 Result<StoredRun> load_run(const Database& database, RunId run) {
   const auto snapshot = Transaction::begin(database, Transaction::Kind::reading);
   if (!snapshot) return fail(snapshot.error());
@@ -271,7 +274,9 @@ Result<StoredRun> load_run(const Database& database, RunId run) {
   if (done = load_poses(database, result.summary.header.adc, result); !done) {
     return fail(done.error());
   }
-  if (done = load_events(database, result); !done) return fail(done.error());
+  auto events = list_events(database, run);
+  if (!events) return fail(events.error());
+  result.events = *std::move(events);
   const auto readings = load_readings(database, run);
   if (!readings) return fail(readings.error());
   add_covariates(result.soak, *readings, "soak", result.left_out);

@@ -28,6 +28,9 @@ struct StoredPose {
 Result<void> each_pose(const Database& database, RunId run,
                        const std::function<void(const StoredPose&)>& use);
 
+/// What was noted during a run, oldest first.
+Result<std::vector<EventRecord>> list_events(const Database& database, RunId run);
+
 /// One run as of one instant, even while another process is writing it (see RunStore::load).
 Result<StoredRun> load_run(const Database& database, RunId run);
 

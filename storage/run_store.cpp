@@ -264,6 +264,10 @@ Result<std::vector<RunSummary>> RunStore::runs() const { return list_runs(*impl_
 
 Result<StoredRun> RunStore::load(RunId run) const { return load_run(*impl_->database, run); }
 
+Result<std::vector<EventRecord>> RunStore::events(RunId run) const {
+  return list_events(*impl_->database, run);
+}
+
 Result<ChainReport> RunStore::check_chain(RunId run) const {
   return storage::check_chain(*impl_->database, run);
 }

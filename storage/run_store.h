@@ -134,6 +134,8 @@ class RunStore {
   Result<std::vector<PoseRecord>> poses(RunId run) const;
   /// Ordinals of the suspect ones, ascending.
   Result<std::vector<long long>> suspect_poses(RunId run) const;
+  /// What was noted during the run, oldest first.
+  Result<std::vector<EventRecord>> events(RunId run) const;
   /// Looks for changed, removed and inserted poses.
   Result<ChainReport> check_chain(RunId run) const;
   /// Ordinals of the committed poses that are not suspect, ascending.

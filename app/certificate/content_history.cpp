@@ -2,11 +2,48 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 
 #include "app/certificate/content.h"
 #include "app/certificate/rounding.h"
 
 namespace plumbline::app::content {
+
+namespace {
+
+/// A run has a thousand changes of state; what a reader looks for is what was out of the ordinary.
+struct Told {
+  std::vector<CertificateEvent> events;
+  std::map<std::string, std::size_t> further;  ///< by kind: how many more
+  std::size_t routine = 0;
+};
+
+constexpr std::size_t kMostOfAKind = 12;
+
+bool is_routine(const CertificateEvent& event) {
+  if (event.kind != "state") return false;
+  for (const char* state : {"moving", "settling", "sampling"}) {
+    if (event.text.starts_with(state)) return true;
+  }
+  return false;
+}
+
+Told told_events(const std::vector<CertificateEvent>& events) {
+  Told told;
+  std::map<std::string, std::size_t> seen;
+  for (const CertificateEvent& event : events) {
+    if (is_routine(event)) {
+      ++told.routine;
+    } else if (++seen[event.kind] > kMostOfAKind) {
+      ++told.further[event.kind];
+    } else {
+      told.events.push_back(event);
+    }
+  }
+  return told;
+}
+
+}  // namespace
 
 void add_history(const Composer& c) {
   c.add(Heading{c.tr("Data and events")});
@@ -27,14 +64,25 @@ void add_history(const Composer& c) {
     c.add(Paragraph{c.tr("No events were recorded.")});
     return;
   }
+  const Told told = told_events(c.input.events);
   Table table;
   table.caption = c.tr("Events of the run");
   table.header = {c.tr("time, s"), c.tr("kind"), c.tr("what happened")};
   table.word_columns = {1, 2};
-  for (const CertificateEvent& event : c.input.events) {
+  for (const CertificateEvent& event : told.events) {
     table.rows.push_back({significant(event.t_s, 5), event.kind, event.text});
   }
-  c.add(std::move(table));
+  if (!table.rows.empty()) c.add(std::move(table));
+  for (const auto& [kind, count] : told.further) {
+    c.add(
+        Paragraph{c.tr("{} further events of the kind “{}” are kept with the run.", count, kind)});
+  }
+  if (told.routine > 0) {
+    c.add(
+        Paragraph{c.tr("Not listed: {} changes of state from pose to pose as planned; they are "
+                       "kept with the run.",
+                       told.routine)});
+  }
 }
 
 }  // namespace plumbline::app::content

@@ -231,6 +231,8 @@ const Catalogue& catalogue() {
     {"Rows skipped", "Пропущено рядків"},
     {"SHA-256 of {}", "SHA-256 файлу {}"},
     {"No events were recorded.", "Подій не записано."},
+    {"{} further events of the kind “{}” are kept with the run.", "Ще {} подій виду «{}» зберігаються разом із записом вимірювань."},
+    {"Not listed: {} changes of state from pose to pose as planned; they are kept with the run.", "Не перелічено: {} змін стану від положення до положення за планом; вони зберігаються разом із записом вимірювань."},
     {"Events of the run", "Події під час вимірювань"},
     {"time, s", "час, s"},
     {"kind", "вид"},

@@ -11,6 +11,7 @@
 #include "app/command/certificate_options.h"
 #include "app/command/command.h"
 #include "app/command/measure.h"
+#include "app/command/station_options.h"
 #include "app/config/rig_description.h"
 #include "app/io/read_file.h"
 #include "app/sequencer/simulated_rig.h"
@@ -30,7 +31,11 @@ struct DryRunArguments {
   std::string world;
   double speed = 60;
   std::uint64_t seed = 1;
+  std::string database;
+  std::string serial;
+  std::string operator_name;
   CertificateOptions certificate;
+  ServeOptions serve;
 };
 
 Result<RigDescription> rig_description(const DryRunArguments& arguments) {
@@ -43,6 +48,7 @@ Result<RigDescription> rig_description(const DryRunArguments& arguments) {
 Result<ExitCode> dry_run(const DryRunArguments& arguments) {
   auto rig = rig_description(arguments);
   if (!rig) return fail(rig.error());
+  if (!arguments.serial.empty()) rig->run.dut.serial = arguments.serial;
   const auto style = certificate_style(arguments.certificate);
   if (!style) return fail(style.error());
   std::string world = kDefaultWorld;
@@ -68,14 +74,21 @@ Result<ExitCode> dry_run(const DryRunArguments& arguments) {
   fmt::print(stderr, "dry-run: simulated rig on {} and {}, {} times real time\n",
              simulated->modbus(), simulated->can(), arguments.speed);
   const std::string hint = fmt::format("plumbline dry-run --out {} (a new run)", arguments.out);
-  return measure_and_calibrate({.session = {.rig = *rig,
-                                            .database = fs::path(arguments.out) / "run.db",
-                                            .out = arguments.out,
-                                            .resume = false},
-                                .out = arguments.out,
-                                .seed = arguments.seed,
-                                .style = *style,
-                                .resume_hint = hint});
+  const fs::path database = arguments.database.empty() ? fs::path(arguments.out) / "run.db"
+                                                       : fs::path(arguments.database);
+  const auto station = station_of_run(arguments.serve, database, arguments.out);
+  if (!station) return fail(station.error());
+  auto code = measure_and_calibrate({.session = {.rig = *rig,
+                                                 .database = database,
+                                                 .out = arguments.out,
+                                                 .resume = false,
+                                                 .operator_name = arguments.operator_name},
+                                     .out = arguments.out,
+                                     .seed = arguments.seed,
+                                     .style = *style,
+                                     .resume_hint = hint});
+  if (*station) (*station)->let_viewers_see_the_end();
+  return code;
 }
 
 }  // namespace
@@ -93,7 +106,11 @@ void add_dry_run(CLI::App& program, Invocation& invocation) {
       ->capture_default_str();
   sub->add_option("--seed", arguments->seed, "of everything random in the world and the results")
       ->capture_default_str();
+  sub->add_option("--db", arguments->database, "run database instead of run.db in that folder");
+  sub->add_option("--serial", arguments->serial, "of the unit, instead of the one in rig.toml");
+  sub->add_option("--operator", arguments->operator_name, "who measures; noted with the run");
   add_certificate_options(*sub, arguments->certificate);
+  add_serve_options(*sub, arguments->serve);
   sub->callback([arguments, &invocation] {
     invocation.action = [arguments] { return dry_run(*arguments); };
   });

@@ -8,6 +8,7 @@
 #include "app/command/certificate_options.h"
 #include "app/command/command.h"
 #include "app/command/measure.h"
+#include "app/command/station_options.h"
 #include "app/config/rig_description.h"
 #include "app/io/output_folder.h"
 
@@ -24,6 +25,8 @@ struct RunArguments {
   CertificateOptions certificate;
   NotifyOptions notify;
   bool no_journal = false;
+  std::string operator_name;
+  ServeOptions serve;
 };
 
 Result<ExitCode> run(const RunArguments& arguments) {
@@ -39,14 +42,19 @@ Result<ExitCode> run(const RunArguments& arguments) {
                   arguments.config, rig->run.dut.serial, arguments.database, arguments.out);
   NotifyOptions notify = arguments.notify;
   if (notify.journal.empty() && !arguments.no_journal) notify.journal = arguments.database + ".log";
-  return measure_and_calibrate({.session = {.rig = *rig,
-                                            .database = arguments.database,
-                                            .out = arguments.out,
-                                            .resume = arguments.resume},
-                                .out = arguments.out,
-                                .style = *style,
-                                .notify = notify,
-                                .resume_hint = hint});
+  const auto station = station_of_run(arguments.serve, arguments.database, arguments.out);
+  if (!station) return fail(station.error());
+  auto code = measure_and_calibrate({.session = {.rig = *rig,
+                                                 .database = arguments.database,
+                                                 .out = arguments.out,
+                                                 .resume = arguments.resume,
+                                                 .operator_name = arguments.operator_name},
+                                     .out = arguments.out,
+                                     .style = *style,
+                                     .notify = notify,
+                                     .resume_hint = hint});
+  if (*station) (*station)->let_viewers_see_the_end();
+  return code;
 }
 
 }  // namespace
@@ -61,7 +69,9 @@ void add_run(CLI::App& program, Invocation& invocation) {
   sub->add_option("--db", arguments->database, "run database, made when absent")->required();
   sub->add_option("--out", arguments->out, "folder for results and certificate")->required();
   sub->add_flag("--resume", arguments->resume, "go on with the unit's last unfinished run");
+  sub->add_option("--operator", arguments->operator_name, "who measures; noted with the run");
   add_certificate_options(*sub, arguments->certificate);
+  add_serve_options(*sub, arguments->serve);
   sub->add_option("--summary", arguments->notify.summary, "how it ended, as JSON, into this file");
   sub->add_option("--hook", arguments->notify.hook,
                   "shell command for every alarm and at the end; PLUMBLINE_EVENT and others say "

@@ -178,10 +178,22 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
 }
 
 Result<Started> begin(storage::RunStore& store, const SessionRequest& request, const Plan& plan) {
-  if (request.resume) return find_unfinished(store, request, plan);
-  auto run = store.create_run(header_of(request.rig, plan));
-  if (!run) return fail(run.error());
-  return Started{*run, {}};
+  Started started;
+  if (request.resume) {
+    auto found = find_unfinished(store, request, plan);
+    if (!found) return found;
+    started = *std::move(found);
+  } else {
+    auto run = store.create_run(header_of(request.rig, plan));
+    if (!run) return fail(run.error());
+    started.run = *run;
+  }
+  if (!request.operator_name.empty()) {
+    const auto noted = store.add_event(
+        started.run, {started.start.t_s, utc_now(), "operator", request.operator_name});
+    if (!noted) return fail(noted.error());
+  }
+  return started;
 }
 
 }  // namespace

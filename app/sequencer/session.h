@@ -15,6 +15,7 @@ struct SessionRequest {
   std::filesystem::path database;
   std::filesystem::path out = {};  ///< shares the disk; only looked at
   bool resume = false;             ///< go on with the last unfinished run of rig.run.dut.serial
+  std::string operator_name = {};  ///< who measures; noted as an event unless empty
 };
 
 /// A run that has been started: how it ended, and which one it is.

@@ -1,0 +1,93 @@
+// Orders and the form that starts runs. Not part of the kiosk view.
+import {ask} from "/app.js";
+
+const id = (name) => document.getElementById(name);
+let station = null;
+
+async function look() {
+  try {
+    station = await ask("/api/station");
+  } catch {
+    return;
+  }
+  const select = id("start-plan");
+  if (select.length !== station.plans.length) {
+    select.replaceChildren(...station.plans.map((plan) => new Option(plan, plan)));
+  }
+  arrange();
+}
+
+let phase = "";
+let status = null;
+function arrange() {
+  const control = station?.control ?? false;
+  const running = phase === "running";
+  const wasHidden = id("start").hidden;
+  id("orders").hidden = !(control && running);
+  id("start").hidden = !control || station.plans.length === 0 || running || phase === "calculating" || Boolean(station.last_start?.running);
+  // A scanner types the serial number and Enter.
+  if (wasHidden && !id("start").hidden) id("start-serial").focus();
+  id("pause").disabled = status?.state === "paused" || status?.pause_requested !== "none";
+  id("resume").disabled = status?.state !== "paused" && status?.pause_requested === "none";
+  const failed = station?.last_start?.message;
+  if (failed && !running) id("start-answer").textContent = `The last start ended: ${failed}`;
+}
+
+async function act(path, order, answer) {
+  answer.textContent = "";
+  for (let attempt = 0; attempt < 2; ++attempt) {
+    try {
+      await ask(path, {
+        method: "POST",
+        headers: {"Content-Type": "application/json", "X-CSRF-Token": station.csrf},
+        body: JSON.stringify(order),
+      });
+      return true;
+    } catch (error) {
+      // The station was started anew since this page was loaded: its token is another one now.
+      if (error.status === 403 && attempt === 0) { await look(); continue; }
+      answer.textContent = error.message;
+      return false;
+    }
+  }
+  return false;
+}
+
+id("pause").addEventListener("click", () => act("/api/order", {order: "pause"}, id("order-answer")));
+id("resume").addEventListener("click", () => act("/api/order", {order: "resume"}, id("order-answer")));
+const dialog = id("confirm-stop");
+id("stop").addEventListener("click", () => dialog.showModal());
+dialog.addEventListener("close", () => {
+  if (dialog.returnValue === "yes") act("/api/order", {order: "stop"}, id("order-answer"));
+  dialog.returnValue = "";
+});
+
+// The scanner's Enter goes to the next field that is empty; the last one starts.
+id("start").addEventListener("keydown", (event) => {
+  if (event.key !== "Enter" || event.target.tagName !== "INPUT") return;
+  const empty = [...id("start").querySelectorAll("input")].find((input) => !input.value.trim());
+  if (!empty) return;
+  event.preventDefault();
+  empty.focus();
+});
+id("start").addEventListener("submit", async (event) => {
+  event.preventDefault();
+  const order = {
+    serial: id("start-serial").value.trim(), operator: id("start-operator").value.trim(), plan: id("start-plan").value,
+  };
+  localStorage.setItem("operator", order.operator);
+  if (await act("/api/start", order, id("start-answer"))) {
+    id("start-serial").value = "";
+    await look();
+  }
+});
+id("start-operator").value = localStorage.getItem("operator") ?? "";
+
+window.addEventListener("live", (event) => {
+  const other = phase !== event.detail.phase;
+  phase = event.detail.phase;
+  status = event.detail.status;
+  if (other) look(); else arrange();
+});
+setInterval(() => { if (station?.last_start?.running) look(); }, 1000);
+look();

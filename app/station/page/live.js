@@ -1,0 +1,241 @@
+// The view of what goes on.
+import {drawMap, drawTrace} from "/chart.js";
+
+const id = (name) => document.getElementById(name);
+const svg = (tag, attributes, text) => {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  if (text) node.textContent = text;
+  return node;
+};
+const kSpan_s = 120;
+const kMostRows = 6000;
+
+// What is shown in big words.
+const words = {
+  idle: "Waiting", homing: "Homing", moving: "Moving", settling: "Settling", sampling: "Sampling", paused: "Paused",
+  recovering: "Recovering", stopping: "Stopping", finished: "Finished", stopped: "Stopped", failed: "Failed",
+  calculating: "Calculating", interrupted: "Interrupted", empty: "Ready",
+};
+const reasons = {
+  calculating: "Everything is measured; the certificate is on its way.",
+  interrupted: "The program that measured has died. The run can be resumed.",
+  stopped: "Ended on request. The run can be resumed.",
+  failed: "Ended by a fault. The run can be resumed.",
+  empty: "No run has been recorded yet.",
+};
+const decisions = {
+  pass: ["PASS", "good"], conditional_pass: ["CONDITIONAL PASS", "warn"],
+  conditional_fail: ["CONDITIONAL FAIL", "warn"], fail: ["FAIL", "bad"], none: ["NO LIMIT STATED", "none"],
+};
+const alarms = new Set(["fault", "bus", "loss", "retry", "suspect", "put off", "left out", "settle_cap"]);
+
+let live = null;
+let rows = [];
+let poses = [];
+let posesVersion = -1;
+let axis = 0;
+let dirty = true;
+
+export const decisionWords = (decision) => decisions[decision] ?? [decision, "none"];
+
+export function clock(seconds) {
+  if (seconds === null || seconds === undefined) return "–";
+  const whole = Math.max(0, Math.round(seconds));
+  const two = (n) => String(n).padStart(2, "0");
+  const h = Math.floor(whole / 3600);
+  return h > 0 ? `${h}:${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}` : `${Math.floor(whole / 60)}:${two(whole % 60)}`;
+}
+
+const text = (name, value) => { const node = id(name); if (node.textContent !== value) node.textContent = value; };
+
+async function get(path) {
+  try { const reply = await fetch(path); return reply.ok ? await reply.json() : null; } catch { return null; }
+}
+
+// What came before this page was opened.
+export async function startLive() {
+  const all = await get("/api/trace");
+  if (all) rows = all.trace;
+  posesVersion = -1;
+  await refresh();
+  dirty = true;
+}
+
+let refreshing = false;
+async function refresh() {
+  if (refreshing || !live) return;
+  refreshing = true;
+  if (live.poses_version !== posesVersion) {
+    const all = await get("/api/poses");
+    if (all) { poses = all.poses; posesVersion = all.poses_version; }
+  }
+  showEvents((await get("/api/events"))?.events ?? []);
+  refreshing = false;
+  dirty = true;
+}
+
+let lastEvents = "";
+function showEvents(list) {
+  const newest = list.slice(-200).reverse();
+  const key = newest.map((e) => `${e.t_s}${e.text}`).join();
+  if (key === lastEvents) return;
+  lastEvents = key;
+  id("events").replaceChildren(...newest.map((event) => {
+    const item = document.createElement("li");
+    if (alarms.has(event.kind)) item.className = "alarm";
+    const time = document.createElement("time");
+    time.dateTime = event.utc;
+    time.textContent = event.utc.slice(11, 19);
+    const kind = document.createElement("span");
+    kind.textContent = event.kind;
+    const what = document.createElement("span");
+    what.textContent = event.text;
+    item.append(time, kind, what);
+    return item;
+  }));
+}
+
+export function showLive(message) {
+  const other = live?.run?.id !== message.run?.id || live?.phase !== message.phase;
+  const before = live?.status?.reason;
+  live = message;
+  document.body.dataset.phase = message.phase;
+  if (other && message.phase === "running") rows = [];
+  const last = rows.length ? rows[rows.length - 1][0] : -1;
+  for (const row of message.trace) if (row[0] > last) rows.push(row);
+  if (rows.length > kMostRows) rows = rows.slice(-kMostRows);
+  if (other || message.poses_version !== posesVersion || before !== message.status?.reason) refresh();
+  board();
+  estimate();
+  dirty = true;
+  window.dispatchEvent(new CustomEvent("live", {detail: message}));
+}
+
+function board() {
+  const {phase, status, run, verdict} = live;
+  const state = phase === "running" ? status.state : phase;
+  document.body.dataset.state = state;
+  text("state", words[state] ?? state);
+  text("reason", phase === "running" ? status.reason : verdict ? outcome(verdict) : reasons[phase] ?? "");
+  text("serial", run?.serial ?? "–");
+  text("run", run?.id ? String(run.id) : "–");
+  text("done", status ? `${status.done} of ${status.steps}` : "–");
+  text("remaining", status ? clock(status.remaining_s) : "–");
+  const temp = status?.newest?.temp_C;
+  text("temperature", typeof temp === "number" ? `${temp.toFixed(2)} °C` : "–");
+  id("progress").value = status ? status.progress : phase === "finished" || phase === "calculating" ? 1 : 0;
+  const box = id("verdict");
+  box.hidden = !verdict;
+  if (verdict) {
+    const [word, kind] = decisionWords(verdict.decision);
+    text("verdict", word);
+    box.className = kind;
+  }
+  document.title = verdict ? `${decisionWords(verdict.decision)[0]} – ${run.serial}` : `${words[state] ?? state} – plumbline`;
+}
+
+function outcome(verdict) {
+  const parts = [];
+  if (verdict.max_abs_error_mps2 !== null) {
+    const mm = (v) => (v * 1000).toPrecision(3);
+    parts.push(`largest error ${mm(verdict.max_abs_error_mps2)} mm/s² ± ${mm(2 * verdict.u_mps2)}, limit ${mm(verdict.limit_mps2)}`);
+  }
+  parts.push(verdict.verdict === "clean" ? "nothing left unexplained" : verdict.effects.length
+    ? `${verdict.verdict.replace("_", " ")}: ${verdict.effects.join(", ")}` : verdict.verdict.replace("_", " "));
+  return parts.join("; ");
+}
+
+// Value ± U, both to the place of U's second digit.
+export function uncertain(value, U) {
+  if (!(U > 0) || !Number.isFinite(value)) return Number.isFinite(value) ? String(value) : "–";
+  const digits = Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(U))));
+  return `${value.toFixed(digits)} ± ${U.toFixed(digits)}`.replaceAll("-", "−");
+}
+
+function estimate() {
+  const {estimate, noise} = live;
+  const body = id("estimate").tBodies[0];
+  body.replaceChildren(...["x", "y", "z"].map((name, i) => {
+    const row = document.createElement("tr");
+    const fit = estimate?.[name];
+    const sd = noise?.sd_mps2?.[i];
+    for (const [k, cell] of [name, fit ? uncertain(fit.value[i], 2 * fit.u[i]) : "–", fit ? uncertain(fit.value[3], 2 * fit.u[3]) : "–",
+      fit ? (fit.rms_mps2 * 1000).toPrecision(3) : "–", typeof sd === "number" ? (sd * 1000).toPrecision(3) : "–"].entries()) {
+      const td = document.createElement(k ? "td" : "th");
+      if (!k) td.scope = "row";
+      td.textContent = cell;
+      row.append(td);
+    }
+    return row;
+  }));
+}
+
+// --- the head: from the side its tilt h, from the front its spindle angle δ ---
+const drawing = id("head");
+function buildHead() {
+  drawing.append(
+    svg("path", {class: "base", d: "M20 170 H150 M85 170 V112"}), svg("text", {class: "mark quiet", x: 85, y: 186}, "tilt h"),
+    svg("path", {class: "dial", d: "M150 108 A65 65 0 0 0 85 43"}));
+  for (let h = 0; h <= 90; h += 30) {
+    const r = h * Math.PI / 180;
+    drawing.append(svg("line", {class: "tick", x1: 85 + 61 * Math.cos(r), y1: 108 - 61 * Math.sin(r), x2: 85 + 68 * Math.cos(r), y2: 108 - 68 * Math.sin(r)}));
+  }
+  drawing.append(
+    svg("line", {id: "aim-arm", class: "aim", x1: 85, y1: 108, x2: 146, y2: 108}),
+    svg("g", {id: "arm"}));
+  const arm = drawing.querySelector("#arm");
+  arm.append(svg("rect", {class: "body", x: 68, y: 98, width: 52, height: 20, rx: 4}), svg("rect", {class: "body", x: 122, y: 86, width: 9, height: 44, rx: 3}));
+  drawing.append(svg("circle", {class: "base", cx: 85, cy: 108, r: 6}));
+  drawing.append(svg("circle", {class: "dial", cx: 240, cy: 95, r: 62}), svg("text", {class: "mark quiet", x: 240, y: 186}, "spindle δ"));
+  for (let d = 0; d < 360; d += 30) {
+    const r = d * Math.PI / 180, a = d % 90 ? 58 : 54;
+    drawing.append(svg("line", {class: "tick", x1: 240 + a * Math.sin(r), y1: 95 - a * Math.cos(r), x2: 240 + 66 * Math.sin(r), y2: 95 - 66 * Math.cos(r)}));
+  }
+  for (const [d, x, y] of [[0, 240, 26], [90, 315, 99], [270, 165, 99]]) drawing.append(svg("text", {class: "mark", x, y}, `${d}`));
+  drawing.append(svg("line", {id: "aim-delta", class: "aim", x1: 240, y1: 95, x2: 240, y2: 33}));
+  const needle = svg("g", {id: "needle-delta"});
+  needle.append(svg("line", {class: "needle", x1: 240, y1: 95, x2: 240, y2: 44}), svg("rect", {class: "body", x: 226, y: 81, width: 28, height: 28, rx: 4}));
+  drawing.append(needle);
+}
+buildHead();
+
+function showHead() {
+  const status = live?.status;
+  if (!status) { text("pose", "no run is going on"); return; }
+  const {head, target} = status;
+  const turn = (name, angle, x, y) => drawing.querySelector(name).setAttribute("transform", `rotate(${angle} ${x} ${y})`);
+  turn("#arm", -head.h_deg, 85, 108); turn("#aim-arm", -target.h_deg, 85, 108);
+  turn("#needle-delta", head.delta_deg, 240, 95); turn("#aim-delta", target.delta_deg, 240, 95);
+  const line = `δ ${head.delta_deg.toFixed(3)}° (to ${target.delta_deg}°)   h ${head.h_deg.toFixed(3)}° (to ${target.h_deg}°)`;
+  text("pose", line + (head.homed ? "" : "   not homed"));
+  drawing.setAttribute("aria-label", `Pose of the head: ${line}`);
+}
+
+const choice = id("map-axis");
+["x", "y", "z"].forEach((name, i) => {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = name;
+  button.setAttribute("aria-pressed", String(i === axis));
+  button.addEventListener("click", () => {
+    axis = i;
+    [...choice.children].forEach((one, k) => one.setAttribute("aria-pressed", String(k === i)));
+    dirty = true;
+  });
+  choice.append(button);
+});
+
+function draw() {
+  if (dirty && live && !id("view-live").hidden) {
+    dirty = false;
+    showHead();
+    drawTrace(id("trace"), rows, kSpan_s);
+    const full = drawMap(id("map"), live.run?.delta_deg ? live.run : null, poses, axis, live.status?.target);
+    text("map-scale", full === null ? "the first estimate needs poses at two tilts" : `axis ${"xyz"[axis]}: up to ${(full * 1000).toPrecision(2)} mm/s² at ${poses.length} positions; scale in mm/s², a dash marks negative ones`);
+  }
+}
+// At most ten times a second, however many messages come.
+setInterval(() => requestAnimationFrame(draw), 100);
+window.addEventListener("resize", () => { dirty = true; });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dirty = true; });
