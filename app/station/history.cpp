@@ -159,7 +159,8 @@ Json yield_json(const std::vector<HistoryRun>& runs, const HistoryOptions& optio
     final_pass += pass.second ? 1 : 0;
   }
   const auto share = [&](int count) {
-    return units.empty() ? Json() : Json(static_cast<double>(count) / units.size());
+    return units.empty() ? Json()
+                         : Json(static_cast<double>(count) / static_cast<double>(units.size()));
   };
   return {{"units", units.size()},
           {"first_pass", share(first_pass)},

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cctype>
 #include <charconv>
+#include <chrono>
 #include <csignal>
 #include <thread>
 
@@ -181,6 +182,8 @@ Result<std::unique_ptr<HttpServer>> HttpServer::start(const ListenAddress& addre
         fmt::format("{}: cannot listen there; is another program using the port?", address.text()));
   }
   library->thread = std::jthread([&server] { server.listen_after_bind(); });
+  // Before it runs it cannot be stopped.
+  while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return std::unique_ptr<HttpServer>(new HttpServer(taken, std::move(library)));
 }
 

@@ -14,6 +14,7 @@
 #include "app/sequencer/engine.h"
 #include "app/sequencer/plan.h"
 #include "app/sequencer/sample_guard.h"
+#include "app/station/running_fit.h"
 
 namespace plumbline::app {
 
@@ -318,9 +319,9 @@ void LiveFeed::look_at_database() {
   fresh_trace_.clear();
   const auto all = history_.runs();
   if (!all || all->empty()) {
-    if (newest()->version == 0) {
-      publish({{"phase", "empty"}, {"status", Json()}, {"verdict", Json()}});
-    }
+    run_json_ = Json();
+    session_.clear();
+    publish({{"phase", "empty"}, {"status", Json()}, {"verdict", Json()}});
     return;
   }
   const HistoryRun& last = *std::max_element(

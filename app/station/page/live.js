@@ -57,22 +57,23 @@ async function get(path) {
 export async function startLive() {
   const all = await get("/api/trace");
   if (all) rows = all.trace;
-  posesVersion = -1;
-  await refresh();
+  await refresh(true);
   dirty = true;
 }
 
 let refreshing = false;
-async function refresh() {
-  if (refreshing || !live) return;
+let again = false;
+async function refresh(everything = false) {
+  if (refreshing || !live) { again = again || everything; return; }
   refreshing = true;
-  if (live.poses_version !== posesVersion) {
+  if (everything || live.poses_version !== posesVersion) {
     const all = await get("/api/poses");
     if (all) { poses = all.poses; posesVersion = all.poses_version; }
   }
   showEvents((await get("/api/events"))?.events ?? []);
   refreshing = false;
   dirty = true;
+  if (again) { again = false; refresh(true); }
 }
 
 let lastEvents = "";
@@ -101,11 +102,11 @@ export function showLive(message) {
   const before = live?.status?.reason;
   live = message;
   document.body.dataset.phase = message.phase;
-  if (other && message.phase === "running") rows = [];
   const last = rows.length ? rows[rows.length - 1][0] : -1;
   for (const row of message.trace) if (row[0] > last) rows.push(row);
   if (rows.length > kMostRows) rows = rows.slice(-kMostRows);
-  if (other || message.poses_version !== posesVersion || before !== message.status?.reason) refresh();
+  if (other) startLive();
+  else if (message.poses_version !== posesVersion || before !== message.status?.reason) refresh();
   board();
   estimate();
   dirty = true;
@@ -175,7 +176,7 @@ function estimate() {
 const drawing = id("head");
 function buildHead() {
   drawing.append(
-    svg("path", {class: "base", d: "M20 170 H150 M85 170 V112"}), svg("text", {class: "mark quiet", x: 85, y: 186}, "tilt h"),
+    svg("path", {class: "base", d: "M20 170 H150 M85 170 V112"}), svg("text", {class: "mark quiet", x: 85, y: 188}, "tilt h"),
     svg("path", {class: "dial", d: "M150 108 A65 65 0 0 0 85 43"}));
   for (let h = 0; h <= 90; h += 30) {
     const r = h * Math.PI / 180;
@@ -187,12 +188,12 @@ function buildHead() {
   const arm = drawing.querySelector("#arm");
   arm.append(svg("rect", {class: "body", x: 68, y: 98, width: 52, height: 20, rx: 4}), svg("rect", {class: "body", x: 122, y: 86, width: 9, height: 44, rx: 3}));
   drawing.append(svg("circle", {class: "base", cx: 85, cy: 108, r: 6}));
-  drawing.append(svg("circle", {class: "dial", cx: 240, cy: 95, r: 62}), svg("text", {class: "mark quiet", x: 240, y: 186}, "spindle δ"));
+  drawing.append(svg("circle", {class: "dial", cx: 240, cy: 95, r: 62}), svg("text", {class: "mark quiet", x: 240, y: 190}, "spindle δ"));
   for (let d = 0; d < 360; d += 30) {
     const r = d * Math.PI / 180, a = d % 90 ? 58 : 54;
     drawing.append(svg("line", {class: "tick", x1: 240 + a * Math.sin(r), y1: 95 - a * Math.cos(r), x2: 240 + 66 * Math.sin(r), y2: 95 - 66 * Math.cos(r)}));
   }
-  for (const [d, x, y] of [[0, 240, 26], [90, 315, 99], [270, 165, 99]]) drawing.append(svg("text", {class: "mark", x, y}, `${d}`));
+  for (const [d, x, y] of [[0, 240, 26], [90, 318, 99], [180, 240, 172], [270, 161, 99]]) drawing.append(svg("text", {class: "mark", x, y}, `${d}`));
   drawing.append(svg("line", {id: "aim-delta", class: "aim", x1: 240, y1: 95, x2: 240, y2: 33}));
   const needle = svg("g", {id: "needle-delta"});
   needle.append(svg("line", {class: "needle", x1: 240, y1: 95, x2: 240, y2: 44}), svg("rect", {class: "body", x: 226, y: 81, width: 28, height: 28, rx: 4}));
