@@ -56,6 +56,11 @@ void add_history(const Composer& c) {
     const std::string file = std::filesystem::path(name).filename().string();
     facts.rows.push_back({c.tr("SHA-256 of {}", file), hash});
   }
+  // Says which run of the database, and that none of its poses was changed.
+  if (!c.input.provenance.chain_head.empty()) {
+    facts.rows.push_back(
+        {c.tr("Last link of the run's hash chain"), c.input.provenance.chain_head});
+  }
   if (!c.input.result_sha256.empty()) {
     facts.rows.push_back({c.tr("SHA-256 of {}", "result.json"), c.input.result_sha256});
   }

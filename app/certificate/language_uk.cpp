@@ -230,6 +230,7 @@ const Catalogue& catalogue() {
     {"Seed", "Початкове число"},
     {"Rows skipped", "Пропущено рядків"},
     {"SHA-256 of {}", "SHA-256 файлу {}"},
+    {"Last link of the run's hash chain", "Остання ланка хеш-ланцюга вимірювань"},
     {"No events were recorded.", "Подій не записано."},
     {"{} further events of the kind “{}” are kept with the run.", "Ще {} подій виду «{}» зберігаються разом із записом вимірювань."},
     {"Not listed: {} changes of state from pose to pose as planned; they are kept with the run.", "Не перелічено: {} змін стану від положення до положення за планом; вони зберігаються разом із записом вимірювань."},
