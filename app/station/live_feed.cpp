@@ -23,6 +23,8 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kLookAgain{500};
+/// Between sessions the results are looked through so many times less often.
+constexpr int kTurnsPerLook = 3;
 constexpr int kWatch_ms = 250;
 /// A session gives a sign of life every kWatch_ms.
 constexpr double kSilence_s = 5;
@@ -127,15 +129,16 @@ bool LiveFeed::session_running() const {
 }
 
 void LiveFeed::follow(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
+  for (int turn = 0; !stop.stop_requested(); ++turn) {
     auto client = ControlClient::connect(control_path(history_.options().database));
     if (client) {
       follow_session(*client, stop);
       const std::lock_guard lock(mutex_);
       running_ = false;
       status_ = Json();
+      turn = 0;
     }
-    look_at_database();
+    if (turn % kTurnsPerLook == 0) look_at_database();
     std::mutex alone;
     std::unique_lock lock(alone);
     std::condition_variable_any().wait_for(lock, stop, kLookAgain, [] { return false; });

@@ -37,7 +37,7 @@ constexpr milliseconds kHeartbeat{3000};
 /// How long an open stream may delay the end of the server.
 constexpr milliseconds kTurn{200};
 /// A viewer that joined late does not keep a finished run waiting.
-constexpr milliseconds kFarewell{1500};
+constexpr milliseconds kFarewell{2500};
 constexpr std::size_t kMostRuns = 200;
 
 struct Asset {
@@ -359,8 +359,13 @@ HttpReply Station::Parts::start_run(const HttpRequest& request) {
 }
 
 HttpReply Station::Parts::health() const {
-  const auto runs = history.runs();
-  if (!runs) return HttpReply::json(503, dump({{"status", "database cannot be read"}}));
+  std::error_code ignored;
+  if (fs::exists(history.options().database, ignored)) {
+    const auto store = storage::RunStore::open_read_only(history.options().database);
+    if (!store || !store->runs()) {
+      return HttpReply::json(503, dump({{"status", "database cannot be read"}}));
+    }
+  }
   return HttpReply::json(200, "{\"status\":\"ok\"}");
 }
 

@@ -144,6 +144,28 @@ TEST(Certificate, EffectsInWordsAndNumbersWithTheirRivals) {
   EXPECT_THAT(html, HasSubstr("<td>58.2</td><td>29.1</td>"));  // left-out poses, before and after
 }
 
+TEST(Certificate, TellsWhatWasOutOfTheOrdinaryAndCountsTheRest) {
+  CertificateExample example;
+  CertificateInput input = example.input();
+  input.events = {{0, "operator", "R. Roe"}};
+  for (int pose = 0; pose < 349; ++pose) {
+    const std::string text = "pose " + std::to_string(pose);
+    for (const char* state : {"moving: ", "settling: ", "sampling: "}) {
+      input.events.push_back({1.0 * pose, "state", state + text});
+    }
+    if (pose % 10 == 0) input.events.push_back({1.0 * pose, "retry", "retried " + text});
+  }
+  input.events.push_back({400, "state", "paused: asked to pause"});
+  const std::string html = write_html(make_certificate(input));
+  EXPECT_THAT(html, HasSubstr("R. Roe"));
+  EXPECT_THAT(html, HasSubstr("paused: asked to pause"));
+  EXPECT_THAT(html, Not(HasSubstr("moving: pose 7")));
+  EXPECT_THAT(html, HasSubstr("Not listed: 1047 changes of state"));
+  EXPECT_THAT(html, HasSubstr("retried pose 110"));
+  EXPECT_THAT(html, Not(HasSubstr("retried pose 120")));
+  EXPECT_THAT(html, HasSubstr("23 further events of the kind “retry”"));
+}
+
 TEST(Certificate, WhatWasLookedForAndNotFound) {
   CertificateExample example;
   CertificateInput input = example.input();
