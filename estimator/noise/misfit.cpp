@@ -121,10 +121,12 @@ double find_band_hz(const std::vector<double>& c, double rate_hz, const std::vec
   constexpr double kFalls = -6;
   constexpr double kFallsNoMore = -3;
   const double nyquist_hz = 0.5 * rate_hz;
-  for (double band_hz = nyquist_hz; band_hz > 0.01 * rate_hz; band_hz *= std::sqrt(0.5)) {
+  constexpr int kMostHalfOctaves = 12;  // down to a hundredth of the rate
+  for (int halves = 0; halves < kMostHalfOctaves; ++halves) {
+    const double band_hz = nyquist_hz * std::pow(2.0, -0.5 * halves);
     const SpectrumSums sums = gather_spectrum(c, rate_hz, masked, band_hz);
     if (sums.bins.size() < 48) break;
-    const bool whole = band_hz == nyquist_hz;
+    const bool whole = halves == 0;
     const unsigned held = whole ? 0 : 1;  // a fall hides what quantization there may be
     const MatrixXd density = shape_densities(sums, {});
     const SpectrumFit fit = fit_powers(sums, density, starting_powers(sums, density, held), held);

@@ -146,7 +146,7 @@ std::string paper_page(const PaperStudy& study) {
                  "Figure 2. Recursive least squares: estimate of K_xx against the number of "
                  "positions, first unit",
                  course(0.02, 0.036),
-                 {{"P₀ = 20·I, weight 1", app::palette::kOrange, &study.recursive_course},
+                 {{"P₀ = 15·I, weight 1", app::palette::kOrange, &study.recursive_course},
                   {"nothing known", app::palette::kBlue, &study.diffuse_course}});
   html += figure("f3",
                  "Figure 3. Eight-state filter: the same; as printed, with unit noise on the "

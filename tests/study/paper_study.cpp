@@ -150,7 +150,7 @@ std::vector<Start> starts() {
        sd_V, kDiffuse, 0},
       {"sd 0.01, readings weighted", "sd 0.01", white, 0.01, sd_V, 0.01, 0},
       {"P₀ = 100·I, weight 1", "nothing known", white, 10, 1, kDiffuse, 0},
-      {"P₀ = 20·I, weight 1", "nothing known", white, std::sqrt(20.0), 1, kDiffuse, 0},
+      {"P₀ = 15·I, weight 1", "nothing known", white, std::sqrt(15.0), 1, kDiffuse, 0},
       {"P₀ = 10·I, weight 1", "nothing known", white, std::sqrt(10.0), 1, kDiffuse, 0},
       {"P₀ = I, weight 1", "nothing known", white, 1, 1, kDiffuse, 0},
       {"nothing known, readings weighted", "nothing known, walk modelled", walk, kDiffuse, sd_V,
@@ -222,7 +222,7 @@ UnitResult one_unit(std::uint64_t seed, PaperStudy* courses) {
          settled_after(filter_run(y, start.filter_prior, start.walk_V, false).course)});
   }
   if (courses != nullptr) {
-    courses->recursive_course = recursive_course(runs[0].one_V, std::sqrt(20.0), 1);
+    courses->recursive_course = recursive_course(runs[0].one_V, std::sqrt(15.0), 1);
     courses->diffuse_course = recursive_course(runs[0].one_V, kDiffuse, reading_sd_V());
     courses->filter_course = filter_run(runs[0].one_V, kDiffuse, 0, false).course;
     courses->printed_course = filter_run(runs[0].one_V, kDiffuse, 0, true).course;
