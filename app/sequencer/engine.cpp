@@ -296,7 +296,7 @@ Engine::Outcome<void> Engine::home() {
     }
   }
   homed_ = true;
-  rehomed_ = !since_homing_.empty();
+  rehomed_ = !since_homing_.empty() || soak_since_homing_;
   return {};
 }
 

@@ -191,8 +191,9 @@ class Engine {
   std::vector<double> planned_s_;        ///< by step
   std::map<long long, PoseMean> means_;  ///< by step, soak excepted
   std::vector<long long> since_homing_;  ///< steps measured since the reference was last confirmed
-  bool reference_confirmed_ = false;     ///< poses before those agree with an earlier homing
-  bool rehomed_ = false;                 ///< the reference has to be checked
+  std::optional<long long> soak_since_homing_;  ///< a soak that no later pose has vouched for
+  bool reference_confirmed_ = false;            ///< poses before those agree with an earlier homing
+  bool rehomed_ = false;                        ///< the reference has to be checked
   bool checking_ = false;
   bool holding_ = false;                ///< paused: what asks for a pause is not looked at
   std::optional<Error> store_failure_;  ///< of an event; ends the run at the next turn

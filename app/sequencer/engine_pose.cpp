@@ -255,10 +255,13 @@ Engine::Outcome<void> Engine::commit(const PlanStep& step, storage::PoseRecord p
   if (pose.kind != storage::PoseKind::soak) {
     means_[step.ordinal] = *progress_.last_pose;
     since_homing_.push_back(step.ordinal);
-  } else if (options_.settling.noise_V <= 0) {
-    floor_ =
-        learn_noise_floor(pose.samples, options_.adc,
-                          static_cast<std::size_t>(options_.settling.window), options_.rate_hz);
+  } else {
+    soak_since_homing_ = step.ordinal;
+    if (options_.settling.noise_V <= 0) {
+      floor_ =
+          learn_noise_floor(pose.samples, options_.adc,
+                            static_cast<std::size_t>(options_.settling.window), options_.rate_hz);
+    }
   }
   report();
   return {};

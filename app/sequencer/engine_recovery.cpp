@@ -197,9 +197,12 @@ Engine::Outcome<std::optional<std::string>> Engine::changed_since(long long step
 }
 
 Engine::Outcome<void> Engine::check_reference() {
+  // A shaft that slips during the soak leaves a step in the long record that no later pose shows.
+  std::vector<long long> wrong;
   if (since_homing_.empty()) {
     rehomed_ = false;
-    return {};
+    if (soak_since_homing_) wrong.push_back(*std::exchange(soak_since_homing_, std::nullopt));
+    return take_out(wrong, "the homing was lost before a pose could be compared");
   }
   checking_ = true;
   // The first pose that has changed, by halving: those before a slip are right, those after it not.
@@ -239,8 +242,10 @@ Engine::Outcome<void> Engine::check_reference() {
     }
   }
   checking_ = false;
-  const std::vector<long long> wrong(since_homing_.begin() + static_cast<std::ptrdiff_t>(bad),
-                                     since_homing_.end());
+  if (good == 0 && soak_since_homing_) wrong.push_back(*soak_since_homing_);
+  soak_since_homing_.reset();
+  wrong.insert(wrong.end(), since_homing_.begin() + static_cast<std::ptrdiff_t>(bad),
+               since_homing_.end());
   since_homing_.resize(good);
   if (good > 0) {
     since_homing_ = {since_homing_.back()};

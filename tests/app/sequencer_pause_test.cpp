@@ -55,7 +55,9 @@ TEST_F(SequencerPause, NowStopsTheMotorsAndThePoseIsMeasuredAnew) {
     const auto session = run_with_pause(Pause::now, at);
     ASSERT_TRUE(session.has_value()) << session.error().message;
     ASSERT_TRUE(session->outcome.has_value()) << session->outcome.error().message;
-    EXPECT_EQ(done_when_paused_, 5u);
+    // A pose whose samples have all arrived by then is committed first, on a busy machine.
+    EXPECT_GE(done_when_paused_, 5u);
+    EXPECT_LE(done_when_paused_, at == EngineState::moving ? 5u : 6u);
     EXPECT_THAT(events("pause"), SizeIs(1));
     EXPECT_THAT(events("go on"), SizeIs(1));
     EXPECT_THAT(events("retry"), IsEmpty()) << "a pause is no failed attempt";

@@ -134,9 +134,9 @@ TEST_F(SequencerRun, RefusesAPlanBeyondTheDrivesLimits) {
   EXPECT_THAT(session->outcome.error().message, HasSubstr("above the soft limit of 369°"));
 }
 
-/// Runs to failure and returns how; the run must be closed in an intact database within 10 s.
+/// Runs to failure and returns how; the run must be closed in an intact database within a minute.
 std::string failure(const Result<Session>& session, std::chrono::steady_clock::time_point start) {
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
   EXPECT_TRUE(session.has_value());
   if (!session) return session.error().message;
   EXPECT_FALSE(session->outcome.has_value());
