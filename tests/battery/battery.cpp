@@ -85,7 +85,7 @@ void Bench::restart(const std::string& more_world) {
                          << "[head]\nmodbus = \"" << rig_->modbus()
                          << "\"\npoll_interval_ms = 2\nwatchdog_ms = "
                          << std::min(60000L, patient_ms(3000))
-                         << "\nresponse_timeout_ms = " << patient_ms(400)
+                         << "\nresponse_timeout_ms = " << std::min(2000L, patient_ms(400))
                          << "\nidentity_address = 0x200\nidentity_count = 4\n"
                          << "[sensor]\nsilence_timeout_ms = " << patient_ms(400) << "\ncan = \""
                          << rig_->can() << "\"\nidentity = \"IDENT.Serial\"\n"
