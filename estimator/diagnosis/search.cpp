@@ -393,7 +393,9 @@ class Search {
     }
     if (winner == nullptr) return false;
     // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
-    const double p = p_of_search(winner_log_p, static_cast<double>(ranked.size()));
+    const std::size_t looks =
+        ranked.size() * list_.family_size[list_.candidates[winner->candidate].family];
+    const double p = p_of_search(winner_log_p, static_cast<double>(looks));
     p_best_rest_ = std::min(p_best_rest_, p);
     if (p > options_.false_alarm_of_slow || !adopt(with_winner)) return false;
     chosen_.push_back(winner->candidate);
