@@ -74,12 +74,12 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
   return sd_V;
 }
 
-// Noise and parameters depend on each other only weakly: one round after the parameters are known
-// settles both. `known`: the noise when it has been pooled already; `before`: powers to start from.
-// `beside`: further functions of the visits, n × any number, that the noise is estimated beside.
-Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
-             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before,
-             const Eigen::MatrixXd& beside = {}) {
+// The noise under given parameters. `known`: when it has been pooled already; `before`: powers to
+// start from; `beside`: further functions of the visits, n × any number, that the noise is
+// estimated beside.
+Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
+                   const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before,
+                   const Eigen::MatrixXd& beside = {}) {
   const auto predicted = predict_means_V(input.log, parameters);
   const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
   const Eigen::Index n = predicted[0].size();
@@ -119,6 +119,14 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
     stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
     stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
   });
+  return stage;
+}
+
+// Noise and parameters depend on each other only weakly: one round after the parameters are known
+// settles both.
+Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
+             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before) {
+  Stage stage = settle_noise(input, parameters, known, before);
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
 }
@@ -352,8 +360,8 @@ class Search {
     const Eigen::MatrixXd beside = slow_functions(input_.log);
     const EnlargedParameters& model = stage_.fit.parameters;
     // The noise that was handed in may have been estimated beside more than the model.
-    const Stage plain = settle(input_, model, nullptr, &stage_.noise);
-    const Stage rich = settle(input_, model, nullptr, &stage_.noise, beside);
+    const Stage plain = settle_noise(input_, model, nullptr, &stage_.noise);
+    Stage rich = settle_noise(input_, model, nullptr, &stage_.noise, beside);
     PerAxis<bool> worth_a_look{};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const double gain = plain.noise[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
@@ -362,6 +370,7 @@ class Search {
     }
     if (std::none_of(worth_a_look.begin(), worth_a_look.end(), [](bool b) { return b; }))
       return false;
+    rich.fit = fit_enlarged(input_.log, rich.observed, rich.whitening, model);
     const CandidateResponses responses =
         candidate_responses(input_.log, list_, rich.whitening, rich.fit.parameters);
     const CandidateGains gains(responses, rich.fit);

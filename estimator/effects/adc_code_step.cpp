@@ -19,7 +19,7 @@ class CodeStep final : public Effect {
     const double low = log.lowest_V[axis], high = log.highest_V[axis];
     // Noise rounds the step off over some of its standard deviations.
     const double fitting = (high - low) / std::max(1.5 * log.input_sd_V[axis], 1e-9);
-    const int boundaries = static_cast<int>(std::clamp(fitting, 64.0, 200.0));
+    const int boundaries = static_cast<int>(std::clamp(fitting, 64.0, 128.0));
     for (int k = 1; k < boundaries; ++k) {
       starts.push_back({{1e-5, low + (high - low) * k / boundaries}});
     }
