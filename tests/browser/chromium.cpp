@@ -146,13 +146,15 @@ bool Chromium::wait_for(const std::string& expression, int limit_s) {
 }
 
 void Chromium::press(const std::string& selector) {
+  // What was scrolled is hit where it is drawn, so the next frames are waited for.
   const json at =
-      value("(() => { const e = document.querySelector(" + json(selector).dump() +
-            "); e.scrollIntoView({block: 'center'}); const r = "
-            "e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; "
+      value("(async () => { const e = document.querySelector(" + json(selector).dump() +
+            "); e.scrollIntoView({block: 'center', behavior: 'instant'}); "
+            "for (let k = 0; k < 3; ++k) await new Promise(done => setTimeout(done, 50)); "
+            "const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; "
             "})()");
   if (!at.is_array()) throw std::runtime_error("there is no " + selector);
-  for (const char* type : {"mousePressed", "mouseReleased"}) {
+  for (const char* type : {"mouseMoved", "mousePressed", "mouseReleased"}) {
     call("Input.dispatchMouseEvent",
          {{"type", type}, {"x", at[0]}, {"y", at[1]}, {"button", "left"}, {"clickCount", 1}});
   }
