@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 namespace plumbline {
-namespace {
 
-/// The different codes, ascending.
 std::vector<std::int64_t> codes_seen(const std::vector<double>& u_V, const Adc& adc) {
   std::vector<std::int64_t> codes;
   codes.reserve(u_V.size());
@@ -17,11 +14,8 @@ std::vector<std::int64_t> codes_seen(const std::vector<double>& u_V, const Adc& 
   return codes;
 }
 
-}  // namespace
-
-std::vector<StuckBit> stuck_bits(const std::vector<double>& u_V, const Adc& adc) {
+std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const Adc& adc) {
   constexpr std::size_t kEnough = 12;  // different codes that agree by chance once in 4000
-  const std::vector<std::int64_t> codes = codes_seen(u_V, adc);
   std::vector<StuckBit> stuck;
   if (codes.size() < kEnough) return stuck;
   const std::int64_t range = codes.back() - codes.front();
@@ -42,10 +36,9 @@ std::vector<StuckBit> stuck_bits(const std::vector<double>& u_V, const Adc& adc)
   return stuck;
 }
 
-std::optional<Lattice> coarser_lattice(const std::vector<double>& u_V, const Adc& adc) {
+std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc) {
   constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
   constexpr double kChance = 1e-9;
-  const std::vector<std::int64_t> codes = codes_seen(u_V, adc);
   if (codes.size() < 5) return {};
   // In declared steps from the lowest code. Rounding twice leaves half a step either way.
   const double range = static_cast<double>(codes.back() - codes.front());

@@ -1,7 +1,8 @@
 #include "estimator/effects/effect.h"
 
 #include <cmath>
-#include <numbers>
+
+#include "estimator/noise/chi_squared.h"
 
 namespace plumbline {
 
@@ -17,7 +18,7 @@ namespace effect {
 
 double share_below(double edge, double value, double sd) {
   if (!(sd > 0)) return value < edge ? 1 : 0;
-  return 0.5 * std::erfc((value - edge) / (sd * std::numbers::sqrt2));
+  return normal_below((edge - value) / sd);
 }
 
 double mean_decay(const Visit& visit, double origin_s, double tau_s) {

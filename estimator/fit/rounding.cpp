@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "estimator/linear_algebra.h"
+#include "estimator/noise/chi_squared.h"
 #include "estimator/noise/covariance.h"
 
 namespace plumbline {
@@ -28,8 +29,6 @@ double noise_before_rounding_V2(double step_V, double recorded_V2) {
   }
   return white_V2;
 }
-
-double normal_below(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
 
 /// Variance of one rounded reading of `value` (in steps from a code) with noise `sigma`, steps².
 double rounded_variance(double value, double sigma) {

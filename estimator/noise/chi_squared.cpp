@@ -3,6 +3,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <unsupported/Eigen/SpecialFunctions>
 
 namespace plumbline {
@@ -31,6 +32,8 @@ double f_tail(double f, double dof1, double dof2) {
   if (dof2 > kManyDegrees) return chi_squared_tail(f * dof1, dof1);
   return Eigen::numext::betainc(0.5 * dof2, 0.5 * dof1, dof2 / (dof2 + dof1 * f));
 }
+
+double normal_below(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
 double normal_two_sided_tail(double z) { return std::erfc(z / std::sqrt(2.0)); }
 

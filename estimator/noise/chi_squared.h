@@ -12,6 +12,9 @@ double f_tail(double f, double dof1, double dof2);
 /// x with P(χ²_dof ≤ x) = p, 0 < p < 1, dof > 0 (not necessarily whole).
 double chi_squared_quantile(double p, double dof);
 
+/// P(Z < z) of the standard normal distribution.
+double normal_below(double z);
+
 /// P(|Z| > z) of the standard normal distribution, z ≥ 0.
 double normal_two_sided_tail(double z);
 

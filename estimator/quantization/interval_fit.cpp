@@ -9,12 +9,12 @@
 #include <map>
 #include <numbers>
 
+#include "estimator/noise/chi_squared.h"
+
 namespace plumbline {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double normal_below(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
 /// log P(low < z < high) of the standard normal distribution, also far out in the tails.
 double log_between(double low, double high) {

@@ -1,0 +1,126 @@
+#include "estimator/diagnosis/noise_stage.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "estimator/fit/rounding.h"
+#include "estimator/parallel_for.h"
+
+namespace plumbline {
+namespace {
+
+Eigen::MatrixXd independent_columns(const Eigen::MatrixXd& block) {
+  // Columns of other axes are zero here; what one axis alone cannot tell apart stays in: a head
+  // angle seen by this axis only weakly costs one degree of freedom at most.
+  std::vector<Eigen::Index> kept;
+  const Eigen::VectorXd norms = block.colwise().norm();
+  Eigen::MatrixXd basis(block.rows(), 0);
+  for (Eigen::Index j = 0; j < block.cols(); ++j) {
+    if (!(norms(j) > 0)) continue;
+    Eigen::VectorXd direction = block.col(j) / norms(j);
+    direction -= basis * (basis.transpose() * direction);
+    direction -= basis * (basis.transpose() * direction);
+    if (direction.norm() < 1e-6) continue;
+    basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
+    basis.col(basis.cols() - 1) = direction.normalized();
+  }
+  return basis;
+}
+
+// Scatter of the contrasts about the model. Few odd dwells do not matter; the median would not do,
+// since readings of a coarse converter are often all the same.
+PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
+                                         const EnlargedParameters& parameters) {
+  const auto predicted = predict_dwells_V(input.log, parameters);
+  PerAxis<Eigen::VectorXd> sd_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    sd_V[i].resize(kDwellContrasts);
+    for (Eigen::Index d = 0; d < kDwellContrasts; ++d) {
+      const Eigen::ArrayXd off =
+          (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).array().abs();
+      const auto count = static_cast<double>(off.size());
+      const double rms = std::sqrt(off.square().sum() / count);
+      const double clipped = std::sqrt(off.min(4 * rms).square().sum() / count);
+      // Contrasts that are all zero (single readings) carry no information.
+      sd_V[i](d) = clipped > 0 ? clipped : 1;
+    }
+  }
+  return sd_V;
+}
+
+}  // namespace
+
+Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
+                   const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before,
+                   const Eigen::MatrixXd& beside) {
+  const auto predicted = predict_means_V(input.log, parameters);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
+  const Eigen::Index n = predicted[0].size();
+  const double samples = static_cast<double>(input.log.visits.front().count);
+  Stage stage;
+  stage.observed = input.observed;
+  stage.whitening.dwell_sd_V = dwell_scatter_V(input, parameters);
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
+    RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
+    const auto free_means = [&](const Eigen::VectorXd& expected_V) {
+      // A converter without one of its bits does not round as it should.
+      if (!input.log.adc || samples < 2 || !input.log.stuck_bits[i].empty()) return;
+      free = free_of_rounding(input.observed.mean_V[i], expected_V, *input.log.adc,
+                              input.log.sample_sd_V[i], samples);
+      mean_V = free.mean_V;
+    };
+    free_means(predicted[i]);
+    const Eigen::VectorXd first_V2 = free.variance_V2;
+    if (known != nullptr) {
+      stage.noise[i] = (*known)[i];
+    } else {
+      Eigen::MatrixXd columns(n, jacobian.cols() + beside.cols());
+      columns << jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n), beside;
+      const Eigen::MatrixXd design = independent_columns(columns);
+      const NoisePool pool(input.processes,
+                           free.coarse ? without_record(input.noise[i]) : input.noise[i],
+                           input.positioning_V2[i] + free.variance_V2);
+      stage.noise[i] = pool.pool(mean_V - predicted[i], design,
+                                 before != nullptr ? &(*before)[i].power : nullptr);
+    }
+    if (free.coarse) {
+      free_means(predicted[i] +
+                 expected_from_others(stage.noise[i].covariance, mean_V - predicted[i]));
+      if (known == nullptr) stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
+    }
+    stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
+    stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
+  });
+  return stage;
+}
+
+Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
+             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before) {
+  Stage stage = settle_noise(input, parameters, known, before);
+  stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
+  return stage;
+}
+
+Eigen::MatrixXd slow_functions(const VisitLog& log) {
+  const auto n = static_cast<Eigen::Index>(log.visits.size());
+  Eigen::MatrixXd functions(n, 0);
+  const auto add = [&](const auto& value_of) {
+    Eigen::VectorXd column(n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      column(k) = value_of(log.visits[static_cast<std::size_t>(k)]);
+    column.array() -= column.mean();
+    if (!column.allFinite() || !(column.norm() > 0)) return;
+    functions.conservativeResize(Eigen::NoChange, functions.cols() + 1);
+    functions.rightCols<1>() = column.normalized();
+  };
+  const double middle_s = 0.5 * (log.first_s() + log.last_s());
+  add([&](const Visit& visit) { return visit.t_mean_s - middle_s; });
+  add([&](const Visit& visit) { return std::pow(visit.t_mean_s - middle_s, 2); });
+  if (log.has_temperature) add([](const Visit& visit) { return visit.temperature_K; });
+  for (std::size_t c = 0; c < log.covariate_names.size(); ++c)
+    add([c](const Visit& visit) { return visit.covariate[c]; });
+  return functions;
+}
+
+}  // namespace plumbline
