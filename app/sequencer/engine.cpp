@@ -165,7 +165,8 @@ const PlanStep* Engine::next_step(const Plan& plan, bool put_off) const {
 Engine::Outcome<void> Engine::start_up(const Plan& plan, const StartPoint& start) {
   enter(EngineState::idle, "waiting for the sensor and the drive");
   if (auto heard = await_first_sample(start.resumed); !heard) return heard;
-  // At a new run somebody stands beside it. A run that goes on does so by itself in the night,
+  // At a new run somebody stands beside it, who learns soon that the drive is not there at all. A
+  // drive that has told its name is there; and a run that goes on does so by itself in the night,
   // after a power cut perhaps while the drive is still starting.
   const auto limit =
       std::chrono::steady_clock::now() + std::chrono::duration<double>(options_.recovery.wait_s);
@@ -173,8 +174,9 @@ Engine::Outcome<void> Engine::start_up(const Plan& plan, const StartPoint& start
     auto met = meet_drive(plan, start);
     if (met) break;
     if (met.error().trouble != Trouble::repeat) return met;
-    const bool again = start.resumed ? std::chrono::steady_clock::now() < limit
-                                     : attempt < options_.recovery.attempts_per_pose;
+    const bool again = start.resumed || drive_is_there_
+                           ? std::chrono::steady_clock::now() < limit
+                           : attempt < options_.recovery.attempts_per_pose;
     if (!again) return give_up(met.error().error);
     note("retry", fmt::format("start, attempt {}: {}", attempt, met.error().error.message));
     if (auto waited = back_off(attempt); !waited) return waited;
@@ -237,6 +239,7 @@ Engine::Outcome<void> Engine::identify(const StartPoint& start) {
   if (identified_) return {};
   auto drive = asked(head_.identity());
   if (!drive) return tl::unexpected(drive.error());
+  drive_is_there_ = true;
   const double limit_s = newest_.t_s + kIdentityWait_s;
   while (options_.node_tells_identity && node_identity_.empty() && newest_.t_s < limit_s) {
     if (control_.stop_requested()) return stop_asked_for();

@@ -201,6 +201,7 @@ class Engine {
   // The drive.
   rig::HeadStatus status_;
   bool head_answers_ = false;
+  bool drive_is_there_ = false;  ///< it has told its name
   bool identified_ = false;
   bool homed_ = false;  ///< by us: a drive that is not, is in trouble
   int approach_ = 0;    ///< direction of the last δ motion
