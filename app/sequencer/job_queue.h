@@ -2,9 +2,9 @@
 //
 //   config = "rig.toml"          # beside this file; what the jobs share
 //   database = "night.db"        # beside this file
-//   out = "night"                # one folder a job below it, and jobs.json, which says what is
-//   done hook = ""                    # as of `plumbline run --hook` on_fault = "stop"            #
-//   or "next": what a job that ends with a rig fault leads to
+//   out = "night"                # a folder for each job, and jobs.json with what is done
+//   hook = ""                    # as of `plumbline run --hook`
+//   on_fault = "stop"            # or "next", after a job that ends with a rig fault
 //
 //   [[job]]
 //   name = "cold"                # of the folder

@@ -9,6 +9,9 @@ namespace {
 /// Longest step of the world, in seconds of the host: longer than any pause of a node's thread on a
 /// machine that keeps up.
 constexpr double kLongestStep_s = 0.05;
+/// A node whose thread gets no time, or whose receiver does not read, may need seconds for a burst.
+/// A reply that overtakes it vouches for a position that the samples after it do not have.
+constexpr std::chrono::seconds kLongestHold{30};
 
 }  // namespace
 
@@ -55,13 +58,12 @@ void Machine::sent() {
 }
 
 void Machine::wait_until_sent() {
-  constexpr std::chrono::milliseconds kLongest{250};
   std::unique_lock lock(mutex_);
   const std::int64_t wanted = taken_ + static_cast<std::int64_t>(samples_.size());
   if (sent_ >= wanted || !node_attached_) return;
   demanded_ = true;
   demand_.notify_all();
-  done_.wait_for(lock, kLongest, [&] { return sent_ >= wanted || !node_attached_; });
+  done_.wait_for(lock, kLongestHold, [&] { return sent_ >= wanted || !node_attached_; });
 }
 
 void Machine::wait_for_demand(std::chrono::microseconds timeout) {

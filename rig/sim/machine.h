@@ -68,7 +68,8 @@ class Machine {
   void attach_node(bool attached);
   /// The samples of the last take_samples() have been sent.
   void sent();
-  /// Until everything taken so far has been sent; at most a quarter of a second.
+  /// Until everything taken so far has been sent, however long the node needs for it; only a node
+  /// that hangs is given up.
   void wait_until_sent();
   /// For the node: until somebody waits in wait_until_sent(), or `timeout` has passed.
   void wait_for_demand(std::chrono::microseconds timeout);

@@ -49,18 +49,33 @@ double patience() {
   return text == nullptr ? 1 : std::max(1.0, std::atof(text));
 }
 
-Folder::Folder(const std::string& parent) {
-  std::string pattern = parent + "/plumbline-battery-XXXXXX";
-  if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder");
-  path_ = pattern;
+std::string ShortPlan::text() const {
+  const double delta_step_deg = 360.0 / deltas;
+  return fmt::format(
+      "\n[plan]\nsoak_s = 5\nsamples_per_pose = {}\nverification_poses = 0\n"
+      "[settling]\nwindow = 10\n{}"
+      "[grid]\ndelta_deg = {{ start = 0, stop = {}, step = {} }}\n"
+      "h_deg = {{ start = 0, stop = {}, step = {} }}\n"
+      // On a machine without time for the drive's answers, a pose fails for no fault of the run's.
+      "[recovery]\nwait_s = {}\nattempts_per_pose = {}\n",
+      samples_per_pose, floor_known ? "noise_V = 0.0001\n" : "", 360 - delta_step_deg,
+      delta_step_deg, (h_rows - 1) * h_step_deg, h_step_deg, 60 * patience(),
+      std::min(100L, std::lround(3 * patience())));
 }
 
-Folder::~Folder() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
+std::size_t ShortPlan::poses() const { return static_cast<std::size_t>(deltas * h_rows + 1); }
+
+void Complaints::add(const std::string& when, const std::string& what) {
+  fmt::print("{}: {}: {}\n", battery_, when, what);
+  std::fflush(stdout);
+  ++count_;
 }
 
-Bench::Bench(const Folder& folder, RigChoice choice)
+void Complaints::add(const std::string& when, const std::vector<std::string>& all) {
+  for (const std::string& what : all) add(when, what);
+}
+
+Bench::Bench(const TempFolder& folder, RigChoice choice)
     : choice_(std::move(choice)), config_(folder / "rig.toml") {
   const auto world = sim::parse_world(kWorld + choice_.world, "world");
   if (!world) throw std::runtime_error(world.error().message);
@@ -107,8 +122,8 @@ double Bench::error_V(const storage::PoseRecord& pose) const {
   return worst;
 }
 
-Program::Program(const Bench& bench, const fs::path& database, const Folder& folder, bool resume,
-                 const std::map<std::string, std::string>& environment)
+Program::Program(const Bench& bench, const fs::path& database, const TempFolder& folder,
+                 bool resume, const std::map<std::string, std::string>& environment)
     : err_(folder / "err") {
   std::vector<std::string> words = {binary("plumbline"),
                                     "run",

@@ -9,29 +9,44 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "app/sequencer/simulated_rig.h"
 #include "estimator/measurement.h"
 #include "storage/run_store.h"
+#include "tests/temp_folder.h"
 
 namespace plumbline::battery {
 
-/// PLUMBLINE_BATTERY_PATIENCE: all deadlines are so many times longer, for a machine that has little
-/// time for a battery. 1 without it.
+/// PLUMBLINE_BATTERY_PATIENCE: all deadlines are so many times longer, for a machine that has
+/// little time for a battery. 1 without it.
 double patience();
 
-/// Removed at the end.
-class Folder {
+/// [plan] … of a run that is through in seconds: a short soak and deltas × h_rows poses.
+struct ShortPlan {
+  int deltas = 4;
+  int h_rows = 3;
+  double h_step_deg = 20;
+  int samples_per_pose = 20;
+  bool floor_known = false;  ///< declared; otherwise it is learnt from the soak
+
+  std::string text() const;
+  std::size_t poses() const;  ///< the soak included
+};
+
+/// Counts and prints what is wrong.
+class Complaints {
  public:
-  explicit Folder(const std::string& parent = "/tmp");
-  ~Folder();
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  explicit Complaints(std::string battery) : battery_(std::move(battery)) {}
+  void add(const std::string& when, const std::string& what);
+  void add(const std::string& when, const std::vector<std::string>& all);
+  int count() const { return count_; }
+  int exit_code() const { return count_ == 0 ? 0 : 1; }
 
  private:
-  std::filesystem::path path_;
+  std::string battery_;
+  int count_ = 0;
 };
 
 struct RigChoice {
@@ -45,7 +60,7 @@ struct RigChoice {
 /// A rig and its rig.toml in `folder`; throws when it does not start.
 class Bench {
  public:
-  Bench(const Folder& folder, RigChoice choice);
+  Bench(const TempFolder& folder, RigChoice choice);
   /// Ends the simulated rig (if it lives) and starts it anew on other wires, with `more_world` in
   /// place of what the choice appends.
   void restart(const std::string& more_world);
@@ -72,7 +87,7 @@ struct Ended {
 /// `plumbline run` on the bench, as a process of its own.
 class Program {
  public:
-  Program(const Bench& bench, const std::filesystem::path& database, const Folder& folder,
+  Program(const Bench& bench, const std::filesystem::path& database, const TempFolder& folder,
           bool resume, const std::map<std::string, std::string>& environment = {});
   ~Program();
   Program(const Program&) = delete;

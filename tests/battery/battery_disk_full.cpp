@@ -11,8 +11,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <fstream>
+#include <thread>
 
 #include "tests/battery/battery.h"
 
@@ -21,52 +23,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPlan = R"(
-[plan]
-soak_s = 5
-samples_per_pose = 10
-verification_poses = 0
-[settling]
-window = 8
-noise_V = 0.0001
-[grid]
-delta_deg = { start = 0, stop = 270, step = 90 }
-h_deg = { start = 0, stop = 20, step = 20 }
-[recovery]
-wait_s = 60
-)";
-constexpr std::size_t kPoses = 9;
-
-int faults = 0;
-void complain(const std::string& when, const std::string& what) {
-  fmt::print("battery-disk-full: {}: {}\n", when, what);
-  ++faults;
-}
+constexpr ShortPlan kPlan = {.h_rows = 2, .samples_per_pose = 10, .floor_known = true};
 
 /// The session that met the full disk, then one with room again.
-void check(const Bench& bench, const Folder& folder, const fs::path& database, const Ended& full,
-           const std::string& when) {
+void check(const Bench& bench, const TempFolder& folder, const fs::path& database,
+           const Ended& full, const std::string& when, Complaints& complaints) {
   const auto lines = std::count(full.err.begin(), full.err.end(), '\n');
   const std::size_t last = full.err.rfind("plumbline: ");
-  if (full.code != 3 && full.code != 2) complain(when, fmt::format("exit code {}", full.code));
-  if (lines < 1 || last == std::string::npos) complain(when, "no clear line: " + full.err);
+  if (full.code != 3 && full.code != 2)
+    complaints.add(when, fmt::format("exit code {}", full.code));
+  if (lines < 1 || last == std::string::npos) complaints.add(when, "no clear line: " + full.err);
   const Audit before = audit(database);
-  for (const std::string& fault : before.faults) complain(when, fault);
+  complaints.add(when, before.faults);
   Program again(bench, database, folder, before.any_run);
   const Ended ended = again.wait();
   if (ended.code != 0 && ended.code != 1) {
-    complain(when, fmt::format("not resumable ({}): {}", ended.code, ended.err));
+    complaints.add(when, fmt::format("not resumable ({}): {}", ended.code, ended.err));
   }
   const Audit now = audit(database, before.poses);
-  for (const std::string& fault : now.faults) complain(when, "after resuming: " + fault);
-  if (now.poses.size() != kPoses) {
-    complain(when, fmt::format("{} poses instead of {}", now.poses.size(), kPoses));
+  complaints.add(when + ", resumed", now.faults);
+  if (now.poses.size() != kPlan.poses()) {
+    complaints.add(when, fmt::format("{} poses instead of {}", now.poses.size(), kPlan.poses()));
   }
 }
 
-int shim(long from, long step, long most, double speed) {
-  const Folder folder;
-  const Bench bench(folder, {.plan = kPlan, .speed = speed});
+int shim(long from, long step, long most, double speed, const std::string& place) {
+  Complaints complaints("battery-disk-full");
+  const TempFolder folder(place);
+  const Bench bench(folder, {.plan = kPlan.text(), .speed = speed});
   long met = 0;
   for (long n = from; met < most; n += step) {
     const fs::path database = folder / fmt::format("run{}.db", n);
@@ -80,18 +64,19 @@ int shim(long from, long step, long most, double speed) {
     }
     if (ended.code == 0 || ended.code == 1) break;  // fewer steps than that: all have been met
     ++met;
-    check(bench, folder, database, ended, fmt::format("step {}", n));
+    check(bench, folder, database, ended, fmt::format("step {}", n), complaints);
     for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(database.string() + suffix);
     if (met % 50 == 0) fmt::print("battery-disk-full: {} failing steps\n", met);
     std::fflush(stdout);
   }
-  fmt::print("battery-disk-full shim: {} failing steps, {} faults\n", met, faults);
-  return faults == 0 ? 0 : 1;
+  fmt::print("battery-disk-full shim: {} failing steps, {} faults\n", met, complaints.count());
+  return complaints.exit_code();
 }
 
-int limit(double speed) {
-  const Folder folder;
-  const Bench bench(folder, {.plan = kPlan, .speed = speed});
+int limit(double speed, const std::string& place) {
+  Complaints complaints("battery-disk-full");
+  const TempFolder folder(place);
+  const Bench bench(folder, {.plan = kPlan.text(), .speed = speed});
   std::signal(SIGXFSZ, SIG_IGN);
   int met = 0;
   for (rlim_t bytes = 4096;; bytes += 8192) {
@@ -110,28 +95,48 @@ int limit(double speed) {
     ++met;
     const std::string when = fmt::format("limit of {} bytes", bytes);
     if (audit(database).state == storage::RunState::finished) continue;  // certificate too large
-    check(bench, folder, database, ended, when);
+    check(bench, folder, database, ended, when, complaints);
   }
-  fmt::print("battery-disk-full limit: {} limits, {} faults\n", met, faults);
-  return faults == 0 ? 0 : 1;
+  fmt::print("battery-disk-full limit: {} limits, {} faults\n", met, complaints.count());
+  return complaints.exit_code();
 }
 
 int small_folder(const std::string& place, double speed) {
-  const Folder folder;
-  const Bench bench(folder, {.plan = kPlan, .speed = speed});
+  Complaints complaints("battery-disk-full");
+  const TempFolder folder;
+  const Bench bench(folder, {.plan = kPlan.text(), .speed = speed});
   const fs::path database = fs::path(place) / "run.db";
   const fs::path filler = fs::path(place) / "filler";
+  const auto fill_but = [&](std::uintmax_t left) {
+    std::ofstream fill(filler, std::ios::binary);
+    const auto room = fs::space(place).available;
+    const std::string block(4096, 'x');
+    for (std::uintmax_t done = 0; done + left + block.size() <= room; done += block.size()) {
+      fill << block;
+    }
+  };
   int met = 0;
+  // Somebody else fills the disk during the run.
+  for (const std::size_t poses : {0U, 1U, 3U, 5U, 7U}) {
+    Ended ended;
+    {
+      Program program(bench, database, folder, false);
+      while (program.running() && audit(database).poses.size() < poses) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      }
+      fill_but(0);
+      ended = program.wait();
+    }
+    fs::remove(filler);
+    if (ended.code != 0 && ended.code != 1) {  // it was quicker
+      ++met;
+      check(bench, folder, database, ended, fmt::format("full after {} poses", poses), complaints);
+    }
+    for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(database.string() + suffix);
+  }
   // Filled up but for less and less; the program's own look at the room is part of what is tested.
   for (const std::uintmax_t left : {4'000'000U, 1'000'000U, 300'000U, 60'000U, 8192U, 0U}) {
-    {
-      std::ofstream fill(filler, std::ios::binary);
-      const auto room = fs::space(place).available;
-      const std::string block(4096, 'x');
-      for (std::uintmax_t done = 0; done + left + block.size() <= room; done += block.size()) {
-        fill << block;
-      }
-    }
+    fill_but(left);
     Ended ended;
     {
       Program program(bench, database, folder, false);
@@ -139,18 +144,19 @@ int small_folder(const std::string& place, double speed) {
     }
     ++met;
     const std::string when = fmt::format("{} bytes left", left);
-    if (ended.code != 3 && ended.code != 2) complain(when, fmt::format("exit code {}", ended.code));
+    if (ended.code != 3 && ended.code != 2)
+      complaints.add(when, fmt::format("exit code {}", ended.code));
     if (ended.err.find("make room") == std::string::npos &&
         ended.err.find("disk") == std::string::npos &&
         ended.err.find("space") == std::string::npos) {
-      complain(when, "the message does not say so: " + ended.err);
+      complaints.add(when, "the message does not say so: " + ended.err);
     }
     fs::remove(filler);
-    for (const std::string& fault : audit(database).faults) complain(when, fault);
+    complaints.add(when, audit(database).faults);
     for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(database.string() + suffix);
   }
-  fmt::print("battery-disk-full folder: {} fillings, {} faults\n", met, faults);
-  return faults == 0 ? 0 : 1;
+  fmt::print("battery-disk-full folder: {} fillings, {} faults\n", met, complaints.count());
+  return complaints.exit_code();
 }
 
 }  // namespace
@@ -163,7 +169,7 @@ int main(int argc, char** argv) {
   long step = 1;
   long most = 1'000'000;
   double speed = 200;
-  std::string place;
+  std::string place = "/tmp";
   CLI::App* shim = app.add_subcommand("shim");
   shim->add_option("--from", from);
   shim->add_option("--step", step);
@@ -172,8 +178,9 @@ int main(int argc, char** argv) {
   CLI::App* folder = app.add_subcommand("folder");
   folder->add_option("place", place)->required();
   for (CLI::App* sub : {shim, limit, folder}) sub->add_option("--speed", speed);
+  for (CLI::App* sub : {shim, limit}) sub->add_option("--in", place, "where the databases are");
   CLI11_PARSE(app, argc, argv);
-  if (shim->parsed()) return plumbline::battery::shim(from, step, most, speed);
-  if (limit->parsed()) return plumbline::battery::limit(speed);
+  if (shim->parsed()) return plumbline::battery::shim(from, step, most, speed, place);
+  if (limit->parsed()) return plumbline::battery::limit(speed, place);
   return plumbline::battery::small_folder(place, speed);
 }

@@ -17,71 +17,37 @@
 namespace plumbline::battery {
 namespace {
 
-constexpr const char* kQuick = R"(
-[plan]
-soak_s = 5
-samples_per_pose = 10
-verification_poses = 0
-[settling]
-window = 8
-noise_V = 0.0001
-)";
-
-std::string plan_of(int h_rows) {
-  return std::string(kQuick) +
-         fmt::format("[grid]\nh_deg = {{ start = 0, stop = {}, step = 10 }}\n", 10 * (h_rows - 1));
-}
-
-std::string small_plan() {
-  return std::string(kQuick) +
-         "[grid]\ndelta_deg = { start = 0, stop = 270, step = 90 }\n"
-         "h_deg = { start = 0, stop = 40, step = 20 }\n";
-}
-
-/// Counts and prints what is wrong.
-class Tally {
- public:
-  void take(const std::vector<std::string>& faults, const std::string& when) {
-    for (const std::string& fault : faults) {
-      fmt::print("battery-kill: {}: {}\n", when, fault);
-      ++faults_;
-    }
-  }
-  int faults() const { return faults_; }
-
- private:
-  int faults_ = 0;
-};
+constexpr ShortPlan kSmall = {.samples_per_pose = 10, .floor_known = true};
 
 /// A session that ends by itself must have done so in order.
-void check_end(const Ended& ended, Tally& tally, const std::string& when) {
+void check_end(const Ended& ended, Complaints& complaints, const std::string& when) {
   if (ended.code != 0 && ended.code != 1 && ended.code != -SIGKILL) {
-    tally.take({fmt::format("ended with {}: {}", ended.code, ended.err)}, when);
+    complaints.add(when, fmt::format("ended with {}: {}", ended.code, ended.err));
   }
 }
 
 /// Session after session is killed one durable step later than the one before, counted from where a
 /// session begins to make progress; once a pose has been committed the count starts anew.
-int systematic(int h_rows, int most, double speed) {
-  const Folder folder;
-  Bench bench(folder, {.world = "[node]\nrate_hz = 50\n",
-                       .plan = plan_of(h_rows) + "[recovery]\nwait_s = 60\n",
-                       .speed = speed});
+int systematic(int h_rows, int most, double speed, const std::string& place) {
+  const ShortPlan plan = {.deltas = 36,
+                          .h_rows = h_rows,
+                          .h_step_deg = 10,
+                          .samples_per_pose = 10,
+                          .floor_known = true};
+  const TempFolder folder(place);
+  const Bench bench(folder,
+                    {.world = "[node]\nrate_hz = 50\n", .plan = plan.text(), .speed = speed});
   const auto database = folder / "run.db";
-  Tally tally;
+  Complaints complaints("battery-kill");
   std::map<long long, std::string> kept;
   int kills = 0;
   int sessions = 0;
   long at = 1;  // the durable step at which this session dies
   std::size_t poses = 0;
+  bool started = false;
   bool finished = false;
   while (!finished && kills < most) {
     const std::string when = fmt::format("session {}, durable step {}", sessions, at);
-    bool started = false;
-    {
-      const Audit before = audit(database, kept);
-      started = before.any_run;
-    }
     Program program(bench, database, folder, started,
                     {{"LD_PRELOAD", shim_path()},
                      {"PLUMBLINE_DISK_FILES", "run.db"},
@@ -90,10 +56,11 @@ int systematic(int h_rows, int most, double speed) {
     const Ended ended = program.wait();
     ++sessions;
     kills += ended.code == -SIGKILL;
-    check_end(ended, tally, when);
+    check_end(ended, complaints, when);
     const Audit now = audit(database, kept);
-    tally.take(now.faults, when);
+    complaints.add(when, now.faults);
     kept = now.poses;
+    started = now.any_run;
     finished = now.state == storage::RunState::finished && ended.code != -SIGKILL;
     if (ended.code != -SIGKILL && ended.code != 0 && ended.code != 1) break;
     if (kept.size() > poses) {
@@ -105,32 +72,33 @@ int systematic(int h_rows, int most, double speed) {
       ++at;
     }
   }
-  const auto expected = static_cast<std::size_t>(36 * h_rows + 1);
-  if (finished && kept.size() != expected) {
-    tally.take({fmt::format("{} poses instead of {}", kept.size(), expected)}, "at the end");
+  if (finished && kept.size() != plan.poses()) {
+    complaints.add("at the end", fmt::format("{} poses instead of {}", kept.size(), plan.poses()));
   }
   fmt::print("battery-kill systematic: {} kills at durable steps, {} poses complete, {} faults\n",
-             kills, kept.size(), tally.faults());
-  return tally.faults() == 0 ? 0 : 1;
+             kills, kept.size(), complaints.count());
+  return complaints.exit_code();
 }
 
-int random_moments(int count, bool while_resuming, std::uint64_t seed, double speed) {
-  const Folder folder;
-  Bench bench(folder, {.plan = small_plan() + "[recovery]\nwait_s = 60\n", .speed = speed});
+int random_moments(int count, bool while_resuming, std::uint64_t seed, double speed,
+                   const std::string& place) {
+  const TempFolder folder(place);
+  const Bench bench(folder, {.plan = kSmall.text(), .speed = speed});
   std::mt19937_64 random(seed);
-  Tally tally;
+  Complaints complaints("battery-kill");
   int kills = 0;
   int runs = 0;
   std::map<long long, std::string> kept;
   // How long a run takes on this machine: the moments lie within.
   const auto begin = std::chrono::steady_clock::now();
-  check_end(Program(bench, folder / "whole.db", folder, false).wait(), tally, "run without a kill");
-  if (tally.faults() > 0) return 1;  // nothing would be killed
+  check_end(Program(bench, folder / "whole.db", folder, false).wait(), complaints,
+            "run without a kill");
+  if (complaints.count() > 0) return 1;  // nothing would be killed
   const double run_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   auto database = folder / "run0.db";
+  bool resume = false;
   while (kills < count) {
-    const bool resume = audit(database).any_run;
     Program program(bench, database, folder, resume);
     const double longest_ms = (while_resuming && resume ? 0.6 : 1.1) * run_ms;
     const double wait_ms = std::uniform_real_distribution<double>(0, longest_ms)(random);
@@ -144,22 +112,26 @@ int random_moments(int count, bool while_resuming, std::uint64_t seed, double sp
     const Ended ended = program.wait();
     kills += counts && ended.code == -SIGKILL;
     const std::string when = fmt::format("run {}, kill {}", runs, kills);
-    check_end(ended, tally, when);
+    check_end(ended, complaints, when);
     const Audit now = audit(database, kept);
-    tally.take(now.faults, when);
+    complaints.add(when, now.faults);
     kept = now.poses;
+    resume = now.any_run;
     if (now.state != storage::RunState::finished) continue;
-    if (kept.size() != 13) tally.take({fmt::format("{} poses instead of 13", kept.size())}, when);
+    if (kept.size() != kSmall.poses()) {
+      complaints.add(when, fmt::format("{} poses instead of {}", kept.size(), kSmall.poses()));
+    }
     ++runs;
     kept.clear();
+    resume = false;
     std::filesystem::remove(database);
     database = folder / fmt::format("run{}.db", runs);
     if (runs % 50 == 0) fmt::print("battery-kill: {} kills, {} runs completed\n", kills, runs);
     std::fflush(stdout);
   }
   fmt::print("battery-kill {}: {} kills, {} runs completed, {} faults\n",
-             while_resuming ? "resume" : "random", kills, runs, tally.faults());
-  return tally.faults() == 0 ? 0 : 1;
+             while_resuming ? "resume" : "random", kills, runs, complaints.count());
+  return complaints.exit_code();
 }
 
 }  // namespace
@@ -173,6 +145,7 @@ int main(int argc, char** argv) {
   int most = 1'000'000;
   double speed = 200;
   std::uint64_t seed = 1;
+  std::string place = "/tmp";
   CLI::App* systematic = app.add_subcommand("systematic");
   systematic->add_option("--h-rows", h_rows)->check(CLI::Range(1, 9));
   systematic->add_option("--most", most, "stop after so many kills");
@@ -182,8 +155,9 @@ int main(int argc, char** argv) {
   for (CLI::App* sub : {systematic, random, resume}) {
     sub->add_option("--speed", speed);
     sub->add_option("--seed", seed);
+    sub->add_option("--in", place, "where the databases are: what is killed here is no disk");
   }
   CLI11_PARSE(app, argc, argv);
-  if (systematic->parsed()) return plumbline::battery::systematic(h_rows, most, speed);
-  return plumbline::battery::random_moments(count, resume->parsed(), seed, speed);
+  if (systematic->parsed()) return plumbline::battery::systematic(h_rows, most, speed, place);
+  return plumbline::battery::random_moments(count, resume->parsed(), seed, speed, place);
 }

@@ -161,7 +161,7 @@ TEST(WireCan, SocketIsRemovedAtTheEnd) {
 }
 
 TEST(WireCan, WhatCannotBeHadIsRefusedInOneLine) {
-  const TemporaryDirectory directory;
+  const TempFolder directory;
   for (const std::string& wrong : {std::string("tcp:1"), std::string("unix:"), std::string("can:"),
                                    "unix:" + std::string(200, 'x')}) {
     auto output = open_frame_output(wrong);

@@ -69,7 +69,7 @@ class WireProgram : public ::testing::Test {
     return eventually([&] { return std::filesystem::exists(directory.file("ready.toml")); }, 60);
   }
 
-  TemporaryDirectory directory;
+  TempFolder directory;
 };
 
 TEST_F(WireProgram, ServesBothWiresAndEndsCleanly) {

@@ -22,25 +22,9 @@
 #include "rig/sim/machine.h"
 #include "rig/sim/modbus_server.h"
 #include "rig/sim/world.h"
+#include "tests/temp_folder.h"
 
 namespace plumbline::sim {
-
-/// A new directory under the system's temporary one, removed at the end.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "plumbline-XXXXXX").string();
-    if (::mkdtemp(name.data()) != nullptr) path_ = name;
-  }
-  ~TemporaryDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// Polls until `condition` holds; false when it does not within `seconds`.
 inline bool eventually(const std::function<bool()>& condition, double seconds = 20) {
@@ -188,7 +172,7 @@ class WireRig {
     return node->endpoint();
   }
 
-  TemporaryDirectory directory;
+  TempFolder directory;
   Machine machine;
   std::unique_ptr<ModbusServer> modbus;
   std::unique_ptr<CanNode> node;

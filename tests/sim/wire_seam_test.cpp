@@ -2,6 +2,11 @@
 // rig. The two share no code for registers, frames or the CRC.
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "rig/acquisition.h"
 #include "rig/rig_config.h"
 #include "tests/sim/wire_rig.h"
 
@@ -44,8 +49,8 @@ TEST_P(WireSeam, HeadHomesMovesAndIsConfirmed) {
   EXPECT_DOUBLE_EQ(limits->upper.h_deg, 94);
 }
 
-/// An open source at the other end of the rig's CAN socket.
-std::unique_ptr<rig::SampleSource> open_source(WireRig& rig, const World& world) {
+/// A source for the other end of the rig's CAN socket.
+std::unique_ptr<rig::SampleSource> make_source(WireRig& rig, const World& world) {
   rig::SensorConfig config;
   config.can = rig.serve_can();
   config.rate_hz = world.rate_hz;
@@ -53,7 +58,6 @@ std::unique_ptr<rig::SampleSource> open_source(WireRig& rig, const World& world)
   config.covariates = {{.column = "rh_pct", .signal = "ENV.Humidity"}};
   auto source = rig::make_sample_source(config);
   EXPECT_TRUE(source.has_value()) << source.error().message;
-  EXPECT_TRUE((*source)->open().has_value());
   return std::move(*source);
 }
 
@@ -74,7 +78,8 @@ rig::SampleBatch read_batch(rig::SampleSource& source, std::size_t count) {
 TEST(WireSeamNode, SourceGetsEverySampleIntact) {
   const World world;
   WireRig rig({}, 100, world);
-  const auto source = open_source(rig, world);
+  const auto source = make_source(rig, world);
+  ASSERT_TRUE(source->open().has_value());
   const rig::SampleBatch batch = read_batch(*source, 5000);
   const std::vector<RawSample>& samples = batch.samples;
   ASSERT_GE(samples.size(), 5000u);
@@ -91,19 +96,33 @@ TEST(WireSeamNode, SourceGetsEverySampleIntact) {
   EXPECT_EQ(statistics.unpaired, 0u);
 }
 
+TEST(WireSeamNode, ReplyWaitsForANodeThatGetsNoTime) {
+  WireRig rig;
+  rig.machine.attach_node(true);
+  EXPECT_TRUE(eventually([&] { return !rig.machine.take_samples().empty(); }));
+  std::atomic<bool> on_the_bus = false;
+  const std::jthread node([&] {
+    std::this_thread::sleep_for(milliseconds(700));
+    on_the_bus = true;
+    rig.machine.sent();
+  });
+  rig.machine.wait_until_sent();
+  EXPECT_TRUE(on_the_bus);
+}
+
 TEST(WireSeamNode, SourceCountsWhatTheNodeSpoils) {
   const Fault silence{.kind = FaultKind::can_silence, .move = 0, .count = 7};
   const Fault bus_off{
       .kind = FaultKind::can_error_frame, .move = 0, .delay_s = 1, .count = 3, .value = 0x40};
   WireRig rig({.all = {silence, bus_off}}, 20);
-  const auto source = open_source(rig, {});
-  read_batch(*source, 100);
+  // Read on a thread of its own, as a run does it: the drive's replies wait for the node, and the
+  // node for its reader.
+  rig::Acquisition acquisition(make_source(rig, {}));
+  ASSERT_TRUE(acquisition.start().has_value());
+  EXPECT_TRUE(eventually([&] { return acquisition.statistics().samples >= 100; }));
   ModbusClient(rig.serve_tcp()).move(0x000, 100000, 1);
-  EXPECT_TRUE(eventually([&] {
-    read_batch(*source, 1);
-    return source->statistics().error_frames == 3;
-  }));
-  EXPECT_EQ(source->statistics().lost_samples, 7u);
+  EXPECT_TRUE(eventually([&] { return acquisition.statistics().error_frames == 3; }));
+  EXPECT_EQ(acquisition.statistics().lost_samples, 7u);
 }
 
 }  // namespace
