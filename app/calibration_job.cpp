@@ -69,7 +69,8 @@ Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& 
       .language = job.style.language,
       .result_sha256 = sha256(result),
       .started_utc = job.started_utc,
-      .finished_utc = job.finished_utc};
+      .finished_utc = job.finished_utc,
+      .signing = job.style.signing ? &*job.style.signing : nullptr};
   if (auto done = write_certificate(certificate, folder); !done) return done;
   if (outcome.verification) {
     const Json json = evaluation_json(*outcome.verification, 0, job.description.limits, provenance);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/certificate/certificate.h"
+#include "app/certificate/dcc/signature.h"
 #include "app/exit_code.h"
 #include "app/provenance.h"
 #include "estimator/calibrate.h"
@@ -20,6 +21,7 @@ namespace plumbline::app {
 struct CertificateStyle {
   Laboratory laboratory;
   Language language = Language::en;
+  std::optional<SigningKey> signing;
 };
 
 /// Everything that a calibration needs, wherever it was read.

@@ -28,6 +28,8 @@ struct NotFound {
   std::string unit;
 };
 
+struct SigningKey;
+
 struct CertificateInput {
   const RunDescription& description;
   const Calibration& calibration;
@@ -40,6 +42,7 @@ struct CertificateInput {
   std::string started_utc = {};    ///< of a stored run; empty: not known
   std::string finished_utc = {};
   std::vector<NotFound> not_found = {};
+  const SigningKey* signing = nullptr;  ///< signs the XML; none: it is not signed
 };
 
 /// "PL-A-0017-20260131-1a2b3c4d": serial, date, and the first digits of the hash over the inputs.

@@ -1,6 +1,7 @@
 #include "app/certificate/certificate_files.h"
 
 #include "app/certificate/dcc/dcc_writer.h"
+#include "app/certificate/dcc/signature.h"
 #include "app/certificate/pdf_file.h"
 #include "app/certificate/pdf_writer.h"
 #include "app/io/sha256.h"
@@ -25,8 +26,12 @@ Result<void> write_certificate(const CertificateInput& input, OutputFolder& fold
   if (!pages) return fail(pages.error());
   const auto opened = open_pdf(*pages, "certificate.pdf");
   if (!opened) return fail(ErrorCode::internal, opened.error().message);
-  const std::string xml = write_dcc(
+  std::string plain_xml = write_dcc(
       input, document, {.html_sha256 = sha256(html), .pdf_pages_sha256 = opened->pages_sha256});
+  const auto signed_xml = input.signing == nullptr ? Result<std::string>(std::move(plain_xml))
+                                                   : sign_dcc(plain_xml, *input.signing);
+  if (!signed_xml) return fail(signed_xml.error());
+  const std::string& xml = *signed_xml;
   const auto pdf = attach(*pages,
                           {{.name = "certificate.xml",
                             .mime = "text/xml",

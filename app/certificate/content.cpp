@@ -28,6 +28,10 @@ std::string sentence(std::string text) {
   const std::size_t word = text.find(' ');
   if (text.substr(0, word).find('.') == std::string::npos) {
     text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+    // Cyrillic а to п, the letters that our sentences begin with.
+    if (text.size() > 1 && text[0] == '\xd0' && text[1] >= '\xb0' && text[1] <= '\xbf') {
+      text[1] = static_cast<char>(text[1] - 0x20);
+    }
   }
   if (text.back() != '.') text += '.';
   return text;

@@ -48,7 +48,7 @@ void add_effect_table(const Composer& c) {
   for (const UnlistedStructure& found : diagnosis.unlisted) {
     const std::string parameters = parameters_text(found.parameters);
     table.rows.push_back({unlisted_name(found, c.tr), axes_text(found.axes),
-                          found.shape + (parameters.empty() ? "" : ": " + parameters),
+                          c.tr.phrase(found.shape) + (parameters.empty() ? "" : ": " + parameters),
                           p_value_text(found.p_value), share(found.heldout_gain)});
   }
   c.add(std::move(table));
@@ -65,7 +65,7 @@ void add_alternatives(const Composer& c) {
     std::string text = others.empty() ? c.tr("nothing else explains the data as well")
                                       : c.tr("these data do not tell it from: {}", others);
     if (!effect.separate_by.empty()) {
-      text += ". " + c.tr("To tell them apart: {}", effect.separate_by);
+      text += ". " + c.tr("To tell them apart: {}", c.tr.phrase(effect.separate_by));
     }
     facts.rows.push_back({effect_name(effect.id, c.tr), text});
   }
@@ -84,7 +84,8 @@ void add_not_found(const Composer& c) {
   table.word_columns = {1, 2};
   for (const NotFound& item : c.input.not_found) {
     const std::string unit = printed_unit(item.unit);
-    table.rows.push_back({effect_name(item.id, c.tr), axes_text(item.axes), item.parameter,
+    table.rows.push_back({effect_name(item.id, c.tr),
+                          item.axes.empty() ? "–" : axes_text(item.axes), item.parameter,
                           significant(item.limit, 2) + (unit.empty() ? "" : " " + unit)});
   }
   c.add(std::move(table));
@@ -141,7 +142,7 @@ void add_findings(const Composer& c) {
   const Diagnosis& diagnosis = c.input.calibration.diagnosis;
   c.add(Heading{c.tr("What the residual shows")});
   c.add(Paragraph{c.tr("Verdict: {}. {} p {} for noise alone.", c.tr(to_string(diagnosis.verdict)),
-                       sentence(diagnosis.reason),
+                       sentence(c.tr.phrase(diagnosis.reason)),
                        (diagnosis.p_value < 1e-6 ? "" : "= ") + p_value_text(diagnosis.p_value)),
                   diagnosis.verdict == Verdict::unexplained ? Tone::warning : Tone::plain});
   if (enlarged(c.input.calibration)) {
@@ -183,8 +184,9 @@ void add_noise(const Composer& c) {
   c.add(std::move(table));
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (calibration.noise[i].remark.empty()) continue;
-    c.add(Paragraph{c.tr("Noise of the {} axis: {}.", kAxisName[i], calibration.noise[i].remark),
-                    Tone::note});
+    c.add(Paragraph{
+        c.tr("Noise of the {} axis: {}.", kAxisName[i], c.tr.phrase(calibration.noise[i].remark)),
+        Tone::note});
   }
   c.add(allan_figure({c.calibration, c.tr}));
 }

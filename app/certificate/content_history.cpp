@@ -5,6 +5,7 @@
 #include <map>
 
 #include "app/certificate/content.h"
+#include "app/certificate/dcc/signature.h"
 #include "app/certificate/rounding.h"
 
 namespace plumbline::app::content {
@@ -64,6 +65,11 @@ void add_history(const Composer& c) {
   if (!c.input.result_sha256.empty()) {
     facts.rows.push_back({c.tr("SHA-256 of {}", "result.json"), c.input.result_sha256});
   }
+  if (c.input.signing != nullptr) {
+    facts.rows.push_back({c.tr("Signature of certificate.xml"),
+                          c.tr("with the key of {}; SHA-256 of its certificate {}",
+                               c.input.signing->subject, c.input.signing->certificate_sha256)});
+  }
   c.add(std::move(facts));
   if (c.input.events.empty()) {
     c.add(Paragraph{c.tr("No events were recorded.")});
@@ -75,7 +81,7 @@ void add_history(const Composer& c) {
   table.header = {c.tr("time, s"), c.tr("kind"), c.tr("what happened")};
   table.word_columns = {1, 2};
   for (const CertificateEvent& event : told.events) {
-    table.rows.push_back({significant(event.t_s, 5), event.kind, event.text});
+    table.rows.push_back({significant(event.t_s, 5), event.kind, c.tr.phrase(event.text)});
   }
   if (!table.rows.empty()) c.add(std::move(table));
   for (const auto& [kind, count] : told.further) {

@@ -56,10 +56,12 @@ void add_identification(const Composer& c) {
   c.add(Heading{c.tr("Item, customer and laboratory")});
   Facts facts;
   facts.rows = {
+      {c.tr("Number of the certificate"), joined(lab.number, c.document.id)},
       {c.tr("Laboratory"), contact(lab.laboratory)},
       {c.tr("Accreditation"), lab.accreditation},
       {c.tr("Place of calibration"), location_text(c)},
       {c.tr("Customer"), contact(lab.customer)},
+      {c.tr("Customer's order"), lab.order},
       {c.tr("Item"), run.dut.model.empty() ? c.tr("accelerometer triad") : run.dut.model},
       {c.tr("Manufacturer"), lab.manufacturer},
       {c.tr("Serial number"), run.dut.serial},
@@ -106,6 +108,7 @@ void add_method(const Composer& c) {
                               : c.tr("not described; nothing is assumed about quantization")},
       {c.tr("Reference temperature"), fmt::format("{} °C", significant(run.reference_C, 3))},
       {c.tr("Temperature during the run"), temperature_range(calibration)},
+      {c.tr("Conditions in the room"), lab.ambient},
   };
   c.add(std::move(facts));
 }

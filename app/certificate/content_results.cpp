@@ -92,7 +92,7 @@ void add_monte_carlo(const Composer& c) {
       "Twelve parameters: 95 % intervals by the law of propagation (GUM) and by Monte Carlo "
       "(JCGM 101), mV/g and mV");
   table.header = {
-      c.tr("parameter"), "GUM",        "Monte Carlo", c.tr("u, GUM"), c.tr("u, Monte Carlo"),
+      c.tr("parameter"), "GUM",        c.tr("Monte Carlo"), c.tr("u, GUM"), c.tr("u, Monte Carlo"),
       c.tr("tolerance"), c.tr("agree")};
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
@@ -187,10 +187,10 @@ void add_budget_rows(const Composer& c, const Budget& budget, Table& table) {
          significant(1e3 * line.contribution, 2), fmt::format("{:.1f} %", 100 * line.share)});
     first = false;
   }
-  table.rows.push_back(
-      {"", c.tr("combined; U = {} {} with k = 2", significant(2e3 * budget.u, 2), unit),
-       significant(1e3 * budget.value, 6) + " " + unit, c.tr("normal"), "",
-       degrees_of_freedom(budget.dof_effective), "", significant(1e3 * budget.u, 2), "100.0 %"});
+  table.rows.push_back({"", c.tr("combined; U = {} {}", significant(2e3 * budget.u, 2), unit),
+                        significant(1e3 * budget.value, 6) + " " + unit, c.tr("normal"), "",
+                        degrees_of_freedom(budget.dof_effective), "",
+                        significant(1e3 * budget.u, 2), "100.0 %"});
 }
 
 }  // namespace
@@ -212,7 +212,7 @@ void add_budget(const Composer& c) {
   const FigureContext context{c.calibration, c.tr};
   c.add(budget_figure(context, c.input.description));
   Table table;
-  table.caption = c.tr("Scale factors and offsets (GUM, JCGM 100:2008)");
+  table.caption = c.tr("Scale factors and offsets (GUM, JCGM 100:2008), U with k = 2");
   table.header = {c.tr("parameter"), c.tr("quantity"), c.tr("estimate"), c.tr("distribution"),
                   c.tr("u"),         c.tr("ν"),        c.tr("c"),        c.tr("c·u, mV/g (mV)"),
                   c.tr("share")};

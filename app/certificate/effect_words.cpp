@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 
 #include "app/certificate/rounding.h"
@@ -91,6 +92,9 @@ std::string parameter_text(const EffectParameter& parameter) {
   text += " = ";
   if (parameter.u > 0) {
     text += result_with_unit(parameter.value, 2 * parameter.u, unit);
+  } else if (parameter.value == std::round(parameter.value) && std::abs(parameter.value) < 1e6) {
+    text += fmt::format("{:.0f}", parameter.value);  // a pose, a bit, an order
+    if (!unit.empty()) text += " " + unit;
   } else {
     text += significant(parameter.value, 6) + (unit.empty() ? "" : " " + unit);
   }

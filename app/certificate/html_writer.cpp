@@ -35,6 +35,7 @@ th, td { padding: 3px 6px; border-bottom: 1px solid #ddd; text-align: right;
          font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
 thead th { border-bottom: 1.5px solid #222; vertical-align: bottom; }
 th:first-child, td:first-child, td.words, th.words { text-align: left; }
+td.words, th.words { padding-left: 14px; }
 dl { display: grid; grid-template-columns: 200px 1fr; gap: 3px 14px; margin: 8px 0 14px; }
 dt { color: #444; }
 dd { margin: 0; overflow-wrap: anywhere; }

@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -30,6 +31,9 @@ class Translator {
   std::string operator()(std::string_view english, const Values&... values) const {
     return fmt::format(fmt::runtime((*this)(english)), values...);
   }
+  /// What the core says of its own accord (reasons, remarks, proposals), clause by clause, with its
+  /// values in place; English where no phrase fits.
+  std::string phrase(std::string_view english) const;
   /// English texts that were asked for and not found so far, for a test.
   const std::set<std::string>& missing() const { return *missing_; }
 
@@ -40,5 +44,7 @@ class Translator {
 
 /// The Ukrainian text for an English one; empty when there is none.
 std::string_view ukrainian(std::string_view english);
+/// Sentences with `{}` for their values, in the order in which they are to be tried.
+std::span<const std::pair<std::string_view, std::string_view>> ukrainian_phrases();
 
 }  // namespace plumbline::app

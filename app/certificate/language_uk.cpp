@@ -1,7 +1,9 @@
 // Ukrainian. The order is that of the chapters; terms follow ДСТУ EN ISO/IEC 17025 and the
 // Ukrainian VIM.
+#include <span>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include "app/certificate/language.h"
 
@@ -38,6 +40,8 @@ const Catalogue& catalogue() {
     {"On {} fresh poses the error is at most {} mm/s² RMS per axis, {} mm/s² at the single worst pose.", "На {} нових положеннях похибка не перевищує {} mm/s² (СКЗ за віссю) і {} mm/s² у найгіршому положенні."},
     // --- item, customer, laboratory ---
     {"Item, customer and laboratory", "Об'єкт, замовник і лабораторія"},
+    {"Number of the certificate", "Номер сертифіката"},
+    {"Customer's order", "Замовлення замовника"},
     {"Laboratory", "Лабораторія"},
     {"Accreditation", "Акредитація"},
     {"Place of calibration", "Місце калібрування"},
@@ -75,6 +79,7 @@ const Catalogue& catalogue() {
     {"not described; nothing is assumed about quantization", "не описано; про квантування нічого не припускається"},
     {"Reference temperature", "Опорна температура"},
     {"Temperature during the run", "Температура під час вимірювань"},
+    {"Conditions in the room", "Умови в приміщенні"},
     // --- results ---
     {"Results", "Результати"},
     {"Output voltage of axis i:  U_i = K_ix·a_x + K_iy·a_y + K_iz·a_z + U_i0, with the specific force a in the frame of the triad in units of g_n = 9.80665 m/s². Expanded uncertainties U with coverage factor k = 2 (about 95 %).", "Вихідна напруга осі i:  U_i = K_ix·a_x + K_iy·a_y + K_iz·a_z + U_i0, де a — питома сила в системі координат тріади в одиницях g_n = 9.80665 m/s². Розширені невизначеності U з коефіцієнтом охоплення k = 2 (близько 95 %)."},
@@ -87,6 +92,7 @@ const Catalogue& catalogue() {
     {"misalignment of the input axis, mrad", "відхил вхідної осі, mrad"},
     {"angle between input axes − 90°, mrad", "кут між вхідними осями − 90°, mrad"},
     {"Mounting convention: the rows of K stand in the frame of the unit as it was mounted on the head: z along the spindle, x up at δ = h = 0, y completing a right-handed frame. A rotation of the mounting changes the entries of K and the misalignments, but neither K1 and K0 nor the angles between the input axes.", "Угода про встановлення: рядки K подано в системі координат пристрою, встановленого на головці: z уздовж шпинделя, x угору при δ = h = 0, y доповнює праву систему. Поворот установлення змінює елементи K і відхили осей, але не змінює K1, K0 та кути між вхідними осями."},
+    {"Monte Carlo", "Монте-Карло"},
     {"Agreement of the estimators", "Узгодженість оцінок"},
     {"Twelve parameters alone, three ways of estimating", "Самі дванадцять параметрів, три способи оцінювання"},
     {"parameter", "параметр"},
@@ -97,13 +103,13 @@ const Catalogue& catalogue() {
     {"Largest E_n number between filter and least squares: x {}, y {}, z {} (agreement up to 1).", "Найбільше число E_n між фільтром і найменшими квадратами: x {}, y {}, z {} (узгодженість до 1)."},
     // --- budget ---
     {"Uncertainty budget", "Бюджет невизначеності"},
-    {"Scale factors and offsets (GUM, JCGM 100:2008)", "Масштабні коефіцієнти та зміщення (GUM, JCGM 100:2008)"},
+    {"Scale factors and offsets (GUM, JCGM 100:2008), U with k = 2", "Масштабні коефіцієнти та зміщення (GUM, JCGM 100:2008), U з k = 2"},
     {"scatter of the readings", "розкид відліків"},
-    {"positioning in δ, each pose", "позиціювання за δ, кожне положення"},
-    {"positioning in h, each pose", "позиціювання за h, кожне положення"},
+    {"positioning in δ, each pose", "позиціювання за δ"},
+    {"positioning in h, each pose", "позиціювання за h"},
     {"local gravity", "місцеве прискорення"},
     {"normal", "нормальний"},
-    {"combined; U = {} {} with k = 2", "сумарна; U = {} {} з k = 2"},
+    {"combined; U = {} {}", "сумарна; U = {} {}"},
     {"quantity", "величина"},
     {"estimate", "оцінка"},
     {"distribution", "розподіл"},
@@ -142,7 +148,7 @@ const Catalogue& catalogue() {
     {"expected RMS of the pose means from the noise alone", "очікуване СКЗ середніх від самого шуму"},
     {"standard uncertainty of the expected RMS", "стандартна невизначеність очікуваного СКЗ"},
     {"What the residual shows", "Що показує залишок"},
-    {"Verdict: {}. {} p {} for noise alone.", "Висновок: {}. Подробиці англійською: {} p {} для самого шуму."},
+    {"Verdict: {}. {} p {} for noise alone.", "Висновок: {}. {} p {} для самого шуму."},
     {"clean", "чистий"},
     {"explained", "пояснений"},
     {"partly_explained", "пояснений частково"},
@@ -231,10 +237,13 @@ const Catalogue& catalogue() {
     {"Rows skipped", "Пропущено рядків"},
     {"SHA-256 of {}", "SHA-256 файлу {}"},
     {"Last link of the run's hash chain", "Остання ланка хеш-ланцюга вимірювань"},
+    {"Signature of certificate.xml", "Підпис файлу certificate.xml"},
+    {"with the key of {}; SHA-256 of its certificate {}", "ключем {}; SHA-256 його сертифіката {}"},
+    {"certificate of the key that signs this file", "сертифікат ключа, яким підписано цей файл"},
     {"No events were recorded.", "Подій не записано."},
     {"{} further events of the kind “{}” are kept with the run.", "Ще {} подій виду «{}» зберігаються разом із записом вимірювань."},
     {"Not listed: {} changes of state from pose to pose as planned; they are kept with the run.", "Не перелічено: {} змін стану від положення до положення за планом; вони зберігаються разом із записом вимірювань."},
-    {"Events of the run", "Події під час вимірювань"},
+    {"Events of the run", "Події під час вимірювань (як записано)"},
     {"time, s", "час, s"},
     {"kind", "вид"},
     {"what happened", "що сталося"},
@@ -300,7 +309,52 @@ const Catalogue& catalogue() {
   return texts;
 }
 
+/// What the core says in English, with a place for each value. The order matters: the first that
+/// fits is taken.
+constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
+    // clang-format off
+    {"{} poses are too few to tell an effect from noise; at least {} are needed", "положень ({}) замало, щоб відрізнити ефект від шуму; потрібно щонайменше {}"},
+    {"the residual is what the identified noise leaves: {}", "залишок такий, який дає визначений шум: {}"},
+    {"explained by {}", "пояснено: {}"},
+    {"{} axis: {}", "вісь {}: {}"},
+    {"residual {} m/s² where {} ± {} is expected", "залишок {} m/s² за очікуваного {} ± {}"},
+    {"the output does not follow the specific force", "вихід не відповідає на питому силу"},
+    {"no noise could be identified", "шум не вдалося визначити"},
+    {"no effect stands out of the identified noise", "жоден ефект не виступає з визначеного шуму"},
+    {"unlisted: a {} in {} changes the {}", "поза переліком: {} від {} змінює {}"},
+    {"polynomial of degree {}", "многочлен степеня {}"},
+    {"harmonic series of order {}", "гармонічний ряд порядку {}"},
+    {"the static record has {} gaps", "у записі в спокої є розриви ({})"},
+    {"its longest stretch of {} samples was used", "використано найдовшу ділянку, {} відліків"},
+    {"a periodic line at {} Hz, amplitude {}, is not noise", "періодична лінія на {} Hz з амплітудою {} не є шумом"},
+    {"{} lines in all, {} of them harmonics", "усього ліній {}, з них гармонік {}"},
+    {"the spectrum falls above {} Hz as no term does: the terms hold below", "вище {} Hz спектр спадає так, як жоден доданок: доданки чинні нижче"},
+    {"the noise is below half a step of the values ({})", "шум менший за половину кроку значень ({})"},
+    {"the terms do not describe the spectrum of this record", "доданки не описують спектра цього запису"},
+    {"the five terms do not describe the spectrum of this record", "п'ять доданків не описують спектра цього запису"},
+    {"the fit of the noise terms did not converge", "оцінювання доданків шуму не збіглося"},
+    {"white noise from the scatter within the poses", "білий шум за розсіянням у межах положень"},
+    {"slow noise left to the run", "повільний шум визначено з усього запису"},
+    {"the run is not finished: {} after {} poses", "вимірювання не завершено: {} після {} положень"},
+    {"{}: not recorded throughout", "{}: записано не скрізь"},
+    {"{} further poses {} (h from {} to {}){} tell it from {} by {} standard deviations", "ще {} положень {} (h від {} до {}){} відрізняють його від {} на {} стандартних відхилень"},
+    {"at the positions where they differ most", "там, де вони різняться найбільше"},
+    {"in random order, with four times the dwell", "у випадковому порядку, з учетверо довшою витримкою"},
+    {"in random order", "у випадковому порядку"},
+    {"to and fro between two positions", "туди й назад між двома положеннями"},
+    {"no poses of this head tell it from {} ({} standard deviations at most): {}", "жодні положення цієї головки не відрізняють його від {} (щонайбільше {} стандартних відхилень): {}"},
+    {"turn the base by 180° in azimuth and measure again: a field of the room stays, the head turns along", "повернути основу на 180° за азимутом і виміряти знову: поле приміщення лишається, головка повертається"},
+    {"turn the base by 180° in azimuth and measure again: a field of the room stays", "повернути основу на 180° за азимутом і виміряти знову: поле приміщення лишається"},
+    {"mount the triad turned by 90° about its z axis, then tipped over, and measure again: what belongs to the sensor turns along, what belongs to the head does not", "установити тріаду повернутою на 90° навколо її осі z, потім перекинутою, і виміряти знову: що належить давачеві, повертається з ним, що належить головці — ні"},
+    {"mount the triad so that this axis covers the whole range from -1 g to +1 g, and measure again", "установити тріаду так, щоб ця вісь пройшла весь діапазон від −1 g до +1 g, і виміряти знову"},
+    // clang-format on
+};
+
 }  // namespace
+
+std::span<const std::pair<std::string_view, std::string_view>> ukrainian_phrases() {
+  return kPhrases;
+}
 
 std::string_view ukrainian(std::string_view english) {
   const auto it = catalogue().find(english);

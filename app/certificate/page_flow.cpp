@@ -230,6 +230,7 @@ class Flow {
 
   struct Row {
     std::vector<SharedLayout> cells;
+    std::vector<double> left;  ///< from the left edge of the column
     double height = 0;
   };
 
@@ -238,9 +239,10 @@ class Flow {
     Row row;
     int lines = 1;
     for (std::size_t c = 0; c < cells.size(); ++c) {
+      row.left.push_back(kCellPad + column_indent(table, c));
       row.cells.push_back(set(cells[c], {.size = kTableSize,
                                          .bold = bold,
-                                         .width = widths[c] - 2 * kCellPad,
+                                         .width = widths[c] - kCellPad - row.left.back(),
                                          .anchor = column_anchor(table, c)}));
       lines = std::max(lines, line_count(row.cells.back()));
     }
@@ -254,7 +256,7 @@ class Flow {
       double x = paper::kLeft;
       for (std::size_t c = 0; c < row.cells.size(); ++c) {
         for (int i = 0; i < line_count(row.cells[c]); ++i) {
-          draw_line(row.cells[c], i, x + kCellPad, y_ + kRowPad + i * line, kTableSize, kInk);
+          draw_line(row.cells[c], i, x + row.left[c], y_ + kRowPad + i * line, kTableSize, kInk);
         }
         x += widths[c];
       }
@@ -269,7 +271,7 @@ class Flow {
       double x = paper::kLeft;
       for (std::size_t c = 0; c < row.cells.size(); ++c) {
         if (i < line_count(row.cells[c])) {
-          draw_line(row.cells[c], i, x + kCellPad, y_, kTableSize, kInk);
+          draw_line(row.cells[c], i, x + row.left[c], y_, kTableSize, kInk);
         }
         x += widths[c];
       }

@@ -32,6 +32,14 @@ Anchor column_anchor(const Table& table, std::size_t column) {
   return words ? Anchor::start : Anchor::end;
 }
 
+double column_indent(const Table& table, std::size_t column) {
+  constexpr double kIndent = 8;
+  return column > 0 && column_anchor(table, column) == Anchor::start &&
+                 column_anchor(table, column - 1) == Anchor::end
+             ? kIndent
+             : 0;
+}
+
 std::vector<double> column_widths(
     const Table& table, double total,
     const std::function<double(const std::string& text, bool bold)>& text_width) {
@@ -50,6 +58,10 @@ std::vector<double> column_widths(
   measure(table.header, true);
   for (const auto& row : table.rows) measure(row, false);
 
+  for (std::size_t c = 0; c < needs.size(); ++c) {
+    needs[c].least += column_indent(table, c);
+    needs[c].natural += column_indent(table, c);
+  }
   std::vector<double> widths(needs.size());
   const auto sum = [&](double Need::*part) {
     return std::accumulate(needs.begin(), needs.end(), 0.0,

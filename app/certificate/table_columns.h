@@ -12,6 +12,9 @@ namespace plumbline::app {
 /// Words to the left, numbers to the right.
 Anchor column_anchor(const Table& table, std::size_t column);
 
+/// Further room to the left of words that follow numbers, which would else touch them.
+double column_indent(const Table& table, std::size_t column);
+
 /// Widths that sum to `total`. Columns keep what their widest cell needs while there is room; where
 /// there is not, those that can wrap share what is left, and in the last resort words are broken.
 /// `text_width(text, bold)` is the width of a text in one line.

@@ -18,6 +18,7 @@ namespace {
 struct VerifyArguments {
   std::string target;
   std::string schema;
+  std::string signer;
   std::string database;
   std::optional<storage::RunId> run;
   std::string head;
@@ -87,7 +88,10 @@ Result<ExitCode> verify(const VerifyArguments& arguments) {
   if (!arguments.database.empty()) return verify_database(arguments);
   if (arguments.target.empty())
     return fail(ErrorCode::input, "verify needs a certificate or --db FILE");
-  const auto report = verify_certificate(arguments.target, schema_of(arguments));
+  const auto report = verify_certificate(
+      arguments.target, schema_of(arguments),
+      arguments.signer.empty() ? std::nullopt
+                               : std::optional<std::filesystem::path>(arguments.signer));
   if (!report) return fail(report.error());
   return print(*report, arguments.target);
 }
@@ -103,6 +107,10 @@ void add_verify(CLI::App& program, Invocation& invocation) {
   sub->add_option("--schema", arguments->schema,
                   "folder that holds v3.3.0/dcc.xsd of the DCC (or PLUMBLINE_DCC_SCHEMA in the "
                   "environment); without it the schema is not checked");
+  sub->add_option("--signer", arguments->signer,
+                  "certificates (PEM): the XML must be signed by one of them, or by a key that one "
+                  "of them vouches for")
+      ->needs(target);
   CLI::Option* database = sub->add_option("--db", arguments->database,
                                           "run database: every pose against its hash chain")
                               ->excludes(target);

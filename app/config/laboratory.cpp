@@ -91,8 +91,11 @@ Result<Laboratory> parse_laboratory(std::string_view text, const std::string& na
   lab.location =
       laboratory.choice_or("location", lab.location,
                            {std::begin(kPerformanceLocations), std::end(kPerformanceLocations)});
+  StrictTable certificate = root.table("certificate");
+  lab.number = line_or_nothing(certificate, "number");
   StrictTable customer = root.table("customer");
   lab.customer = read_address(customer);
+  lab.order = line_or_nothing(customer, "order");
   StrictTable item = root.table("item");
   lab.manufacturer = line_or_nothing(item, "manufacturer");
   lab.item_condition = line_or_nothing(item, "condition");
@@ -112,9 +115,18 @@ Result<Laboratory> parse_laboratory(std::string_view text, const std::string& na
   StrictTable procedure = root.table("procedure");
   lab.procedure = line_or_nothing(procedure, "name");
   lab.deviations = line_or_nothing(procedure, "deviations");
+  StrictTable conditions = root.table("conditions");
+  lab.ambient = line_or_nothing(conditions, "ambient");
   StrictTable authorised = root.table("authorised_by");
   lab.authorised_by = line_or_nothing(authorised, "name");
   lab.authorised_role = line_or_nothing(authorised, "role");
+  StrictTable signature = root.table("signature");
+  lab.signing_key = signature.text_or("key", "");
+  lab.signing_certificate = signature.text_or("certificate", "");
+  if (lab.signing_key.empty() != lab.signing_certificate.empty()) {
+    signature.refuse(lab.signing_key.empty() ? "certificate" : "key",
+                     "key and certificate go together");
+  }
   if (auto done = file->finish(); !done) return fail(done.error());
   return lab;
 }
@@ -122,7 +134,12 @@ Result<Laboratory> parse_laboratory(std::string_view text, const std::string& na
 Result<Laboratory> read_laboratory(const std::filesystem::path& path) {
   const auto file = rig::StrictFile::read(path);
   if (!file) return fail(file.error());
-  return parse_laboratory(file->source(), path.string());
+  auto lab = parse_laboratory(file->source(), path.string());
+  if (lab && !lab->signing_key.empty()) {
+    lab->signing_key = path.parent_path() / lab->signing_key;
+    lab->signing_certificate = path.parent_path() / lab->signing_certificate;
+  }
+  return lab;
 }
 
 }  // namespace plumbline::app

@@ -37,7 +37,9 @@ struct Laboratory {
   Address laboratory;
   std::string accreditation;  ///< number of the laboratory's accreditation
   std::string location = "laboratory";
+  std::string number;  ///< of the certificate in the laboratory's own books
   Address customer;
+  std::string order;           ///< the customer's order
   std::string manufacturer;    ///< of the item
   std::string item_condition;  ///< as received
   std::string customer_item;   ///< the customer's own number of the item
@@ -48,12 +50,16 @@ struct Laboratory {
   TraceabilitySource gravity;  ///< local g
   std::string procedure;
   std::string deviations;  ///< from the procedure
+  std::string ambient;     ///< conditions in the room, in words: humidity, pressure
   std::string authorised_by;
   std::string authorised_role;
+  std::filesystem::path signing_key;  ///< PEM; empty: certificate.xml is not signed
+  std::filesystem::path signing_certificate;
 };
 
 /// Every key is optional. Refused with file, line and column: unknown keys, countries that are not
-/// two capital letters, dates that are none or in the wrong order.
+/// two capital letters, dates that are none or in the wrong order, a key without certificate. Paths
+/// are relative to the folder of the file.
 Result<Laboratory> read_laboratory(const std::filesystem::path& path);
 Result<Laboratory> parse_laboratory(std::string_view text, const std::string& name);
 

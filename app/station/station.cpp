@@ -248,10 +248,15 @@ HttpReply Station::Parts::station(const HttpRequest& request) {
   const bool control =
       guard->may_control(request) && request.header("referer").find("/kiosk") == std::string::npos;
   Json plans = Json::array();
-  for (const StationPlan& plan : launcher.options().plans) plans.push_back(plan.name);
+  Json resumable = Json::array();
+  for (const StationPlan& plan : launcher.options().plans) {
+    plans.push_back(plan.name);
+    if (!plan.simulated) resumable.push_back(plan.name);
+  }
   return HttpReply::json(200, dump({{"control", control},
                                     {"csrf", control ? Json(guard->csrf()) : Json()},
                                     {"plans", control ? plans : Json::array()},
+                                    {"resumable", control ? resumable : Json::array()},
                                     {"last_start", launcher.last_json()},
                                     {"program_version", program_version()},
                                     {"database", history.options().database.filename().string()},

@@ -8,6 +8,7 @@
 
 #include "app/certificate/dcc/dcc_units.h"
 #include "app/certificate/dcc/dcc_writer.h"
+#include "app/certificate/dcc/signature.h"
 #include "app/certificate/fingerprint.h"
 #include "app/certificate/pdf_file.h"
 #include "app/certificate/rounding.h"
@@ -183,6 +184,47 @@ void check_siblings(const Files& files, const ReadDcc& dcc, VerifyReport& report
   check_numbers(files, dcc, report);
 }
 
+Result<void> check_signer(const Files& files, const ReadDcc& dcc,
+                          const std::optional<fs::path>& signer, VerifyReport& report) {
+  std::string trusted;
+  if (signer) {
+    auto pem = read_file(*signer);
+    if (!pem) return fail(pem.error());
+    trusted = *std::move(pem);
+    if (trusted.empty()) return fail(ErrorCode::input, signer->string() + ": empty");
+  }
+  const auto found = check_signature(files.xml, trusted);
+  if (!found) {
+    return fail(found.error().code,
+                (signer ? signer->string() + ": " : "") + found.error().message);
+  }
+  const std::string stated = dcc.hash(dcc_ref::kSigner);
+  if (!found->present) {
+    if (signer || !stated.empty()) {
+      report.bad("signature: there is none, but one was expected");
+    } else {
+      report.not_done("signature: the XML has none");
+    }
+    return {};
+  }
+  report.expect(found->wrong.empty(),
+                found->subject.empty()
+                    ? "signature of the whole XML"
+                    : fmt::format("signature of the whole XML by {} (certificate valid {}, SHA-256 "
+                                  "{})",
+                                  found->subject, found->valid, found->certificate_sha256),
+                found->wrong);
+  report.expect(stated == found->certificate_sha256, "the signer is the one that the XML states",
+                stated.empty() ? "it states none" : "stated is " + stated);
+  if (found->trusted) {
+    report.expect(*found->trusted, "the signer is known by " + signer->string(),
+                  "the certificate is another one");
+  } else {
+    report.not_done("who signed: not checked; name the laboratory's certificate with --signer");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::vector<std::string>> html_words(std::string_view html, const std::string& name) {
@@ -196,7 +238,8 @@ Result<std::vector<std::string>> html_words(std::string_view html, const std::st
 }
 
 Result<VerifyReport> verify_certificate(const fs::path& target,
-                                        const std::optional<fs::path>& schema) {
+                                        const std::optional<fs::path>& schema,
+                                        const std::optional<fs::path>& signer) {
   const auto files = read_files(target);
   if (!files) return fail(files.error());
   const auto dcc = read_dcc(files->xml, files->xml_name);
@@ -210,6 +253,7 @@ Result<VerifyReport> verify_certificate(const fs::path& target,
   check_rules(*dcc, report);
   compare_hash(report, "certificate.xml", dcc->hash(dcc_ref::kSelf), dcc_self_hash(files->xml));
   check_siblings(*files, *dcc, report);
+  if (auto done = check_signer(*files, *dcc, signer, report); !done) return fail(done.error());
   return report;
 }
 

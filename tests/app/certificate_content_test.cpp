@@ -8,6 +8,7 @@
 #include "app/certificate/effect_words.h"
 #include "app/certificate/sensor_terms.h"
 #include "app/certificate/table_columns.h"
+#include "estimator/diagnosis/verdict.h"
 #include "estimator/effects/catalogue.h"
 #include "tests/app/certificate_example.h"
 
@@ -126,7 +127,7 @@ TEST(EffectWords, EveryEffectHasANameInBothLanguages) {
 TEST(EffectWords, ParametersAsTheyArePrinted) {
   EXPECT_EQ(parameter_text({"k2", 0, 0.012345, 0.0002, "g/g^2"}),
             "k2 (x) = (0.01235 ± 0.00040) g/g²");
-  EXPECT_EQ(parameter_text({"n", {}, 5, 0, ""}), "n = 5.00000");
+  EXPECT_EQ(parameter_text({"n", {}, 5, 0, ""}), "n = 5");
   EXPECT_EQ(parameter_text({"epsilon", {}, -0.1, 0.01, "deg"}), "epsilon = (−0.100 ± 0.020) °");
 }
 
@@ -185,12 +186,45 @@ TEST(Certificate, UkrainianLeavesNothingUntranslated) {
   unlisted.form = "scale";
   example.calibration.diagnosis.unlisted = {unlisted};
   const Translator tr(Language::uk);
+  example.add_not_found();
   const std::string html = write_html(make_certificate(example.input(), tr));
   EXPECT_THAT(tr.missing(), testing::IsEmpty());
   EXPECT_THAT(html, HasSubstr("<html lang=\"uk\">"));
   EXPECT_THAT(html, HasSubstr("ВІДПОВІДАЄ"));
   EXPECT_THAT(html, HasSubstr("нелінійність другого порядку"));
   EXPECT_THAT(html, Not(HasSubstr("not stated")));
+}
+
+TEST(Certificate, UkrainianForWhatTheCoreSays) {
+  const Translator uk(Language::uk), en(Language::en);
+  const std::string reason =
+      "x axis: residual 0.111 m/s² where 0.026 ± 0.002 is expected; y axis: no noise could be "
+      "identified; explained by rig.backlash (x): w = 2.3 deg";
+  EXPECT_EQ(en.phrase(reason), reason);
+  EXPECT_EQ(uk.phrase(reason),
+            "вісь x: залишок 0.111 m/s² за очікуваного 0.026 ± 0.002; вісь y: шум не вдалося "
+            "визначити; пояснено: rig.backlash (x): w = 2.3 deg");
+  EXPECT_EQ(uk.phrase("17 poses are too few to tell an effect from noise; at least 24 are needed"),
+            "положень (17) замало, щоб відрізнити ефект від шуму; потрібно щонайменше 24");
+  EXPECT_EQ(uk.phrase("something new"), "something new");
+}
+
+// What the core says and the catalogue repeats: whoever changes one, changes the other.
+TEST(Certificate, UkrainianKnowsTheVerdictOfTheCore) {
+  VerdictInput input;
+  input.poses = 3;
+  Diagnosis diagnosis;
+  decide_verdict(input, diagnosis);
+  EXPECT_THAT(Translator(Language::uk).phrase(diagnosis.reason), HasSubstr("замало"));
+  input.poses = 100;
+  for (auto& axis : input.axis) {
+    axis = {};
+    axis.responds = axis.noise_known = true;
+    axis.p_value = 0.5;
+  }
+  decide_verdict(input, diagnosis);
+  EXPECT_THAT(Translator(Language::uk).phrase(diagnosis.reason), HasSubstr("залишок такий"));
+  EXPECT_THAT(Translator(Language::uk).phrase(diagnosis.reason), Not(HasSubstr("residual")));
 }
 
 // --- tables ---

@@ -94,6 +94,16 @@ struct CertificateExample {
     }
   }
 
+  /// As many limits of detection as the list of effects gives.
+  void add_not_found() {
+    static constexpr const char* kUnits[] = {"g/g^2", "deg", "g/K", "s"};
+    for (std::size_t k = 0; k < 45; ++k) {
+      not_found.push_back({k % 3 == 0 ? "rig.delta_periodic" : "sensor.temperature_scale",
+                           k % 3 == 0 ? std::vector<std::size_t>{} : std::vector<std::size_t>{0, 2},
+                           "c", 0.00123 * static_cast<double>(k + 1), kUnits[k % 4]});
+    }
+  }
+
   /// Names as long as a form allows, without a place to break.
   void make_names_long() {
     const std::string name(60, 'W');
@@ -116,12 +126,13 @@ struct CertificateExample {
   }
 
   CertificateInput input() const {
-    return {description, calibration, provenance, &verification,
-            events,      laboratory,  language,   result_sha256};
+    return {description,   calibration, provenance, &verification, events, laboratory, language,
+            result_sha256, {},          {},         not_found};
   }
   std::string html() const { return write_html(make_certificate(input())); }
 
   std::vector<CertificateEvent> events;
+  std::vector<NotFound> not_found;
   Laboratory laboratory;
   Language language = Language::en;
   std::string result_sha256 = std::string(64, '7');

@@ -227,6 +227,7 @@ TEST_F(CertificatePdf, NothingOverflowsOrOverlaps) {
   CertificateExample crowded;
   crowded.add_effects(12);
   crowded.make_names_long();
+  crowded.add_not_found();
   expect_tidy(write("crowded.pdf", pdf_of(make_certificate(crowded.input()))));
   crowded.language = Language::uk;
   expect_tidy(write("crowded-uk.pdf", pdf_of(make_certificate(crowded.input()))));

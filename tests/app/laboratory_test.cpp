@@ -46,6 +46,7 @@ TEST(Laboratory, RefusesWithPlaceAndReason) {
   EXPECT_THAT(refusal("[dates]\nreceived = \"2026-02-29\"\n"), HasSubstr("2026-02-29"));
   EXPECT_THAT(refusal("[dates]\nperformed_from = \"2026-02-02\"\nperformed_to = \"2026-02-01\"\n"),
               HasSubstr("before"));
+  EXPECT_THAT(refusal("[signature]\nkey = \"lab.key\"\n"), HasSubstr("go together"));
   EXPECT_THAT(refusal("[laboratory]\nlocation = \"labratory\"\n"), HasSubstr("laboratory"));
 }
 

@@ -4,12 +4,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/rsa.h>
+#include <openssl/x509.h>
+#include <openssl/x509v3.h>
+
 #include <cstdlib>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "app/certificate/dcc/dcc_units.h"
 #include "app/certificate/dcc/dcc_writer.h"
+#include "app/certificate/dcc/signature.h"
 #include "app/certificate/fingerprint.h"
 #include "app/verify/dcc_reader.h"
 #include "tests/app/certificate_example.h"
@@ -160,6 +167,166 @@ TEST(Fingerprint, HtmlHasTheWordsOfTheDocument) {
   }
 }
 
+// --- the signature ---
+
+/// A key and a certificate for it by `issuer` (itself when there is none), as PEM files.
+class Identity {
+ public:
+  explicit Identity(const std::string& name, const Identity* issuer = nullptr,
+                    EVP_PKEY* key = EVP_EC_gen("P-256"))
+      : key_(key), certificate_(X509_new()) {
+    X509_set_version(certificate_, 2);
+    ASN1_INTEGER_set(X509_get_serialNumber(certificate_), 7);
+    X509_gmtime_adj(X509_getm_notBefore(certificate_), -60);
+    X509_gmtime_adj(X509_getm_notAfter(certificate_), 86400);
+    X509_set_pubkey(certificate_, key_);
+    X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate_), "CN", MBSTRING_UTF8,
+                               reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);
+    X509_EXTENSION* authority =
+        X509V3_EXT_conf_nid(nullptr, nullptr, NID_basic_constraints, "critical,CA:TRUE");
+    X509_add_ext(certificate_, authority, -1);
+    X509_EXTENSION_free(authority);
+    const Identity& by = issuer == nullptr ? *this : *issuer;
+    X509_set_issuer_name(certificate_, X509_get_subject_name(by.certificate_));
+    X509_sign(certificate_, by.key_, EVP_sha256());
+  }
+  ~Identity() {
+    X509_free(certificate_);
+    EVP_PKEY_free(key_);
+  }
+  Identity(const Identity&) = delete;
+  Identity& operator=(const Identity&) = delete;
+
+  void expire() {
+    X509_gmtime_adj(X509_getm_notAfter(certificate_), -30);
+    X509_sign(certificate_, key_, EVP_sha256());
+  }
+  std::string certificate_pem() const {
+    return pem([&](BIO* bio) { PEM_write_bio_X509(bio, certificate_); });
+  }
+  std::string key_pem(const char* passphrase = nullptr) const {
+    return pem([&](BIO* bio) {
+      PEM_write_bio_PKCS8PrivateKey(bio, key_, passphrase == nullptr ? nullptr : EVP_aes_128_cbc(),
+                                    nullptr, 0, nullptr, const_cast<char*>(passphrase));
+    });
+  }
+
+ private:
+  template <class Write>
+  static std::string pem(const Write& write) {
+    BIO* bio = BIO_new(BIO_s_mem());
+    write(bio);
+    const char* data = nullptr;
+    const auto size = BIO_get_mem_data(bio, &data);
+    std::string text(data, static_cast<std::size_t>(size));
+    BIO_free(bio);
+    return text;
+  }
+
+  EVP_PKEY* key_;
+  X509* certificate_;
+};
+
+class Signature : public testing::Test {
+ protected:
+  Result<SigningKey> read(const Identity& key, const Identity& certificate,
+                          const std::string& passphrase = "") {
+    write_text(folder_ / "key.pem", key.key_pem(passphrase.empty() ? nullptr : passphrase.c_str()));
+    write_text(folder_ / "crt.pem", certificate.certificate_pem());
+    return read_signing_key(folder_ / "key.pem", folder_ / "crt.pem", passphrase);
+  }
+  std::string signed_by(const Identity& who) {
+    const auto key = read(who, who);
+    EXPECT_TRUE(key) << key.error().message;
+    CertificateExample example;
+    CertificateInput input = example.input();
+    input.signing = &*key;
+    const auto xml = sign_dcc(write_dcc(input, make_certificate(input), {}), *key);
+    EXPECT_TRUE(xml) << xml.error().message;
+    return *xml;
+  }
+  static SignatureFound found(const std::string& xml, const std::string& trusted = "") {
+    const auto result = check_signature(xml, trusted);
+    EXPECT_TRUE(result) << result.error().message;
+    return result.value_or(SignatureFound{});
+  }
+
+  TempFolder folder_;
+  const Identity lab_{"Лабораторія 7"};
+};
+
+TEST_F(Signature, HoldsForTheDocumentItIsOn) {
+  const std::string xml = signed_by(lab_);
+  const SignatureFound signature = found(xml);
+  EXPECT_TRUE(signature.present);
+  EXPECT_EQ(signature.wrong, "");
+  EXPECT_EQ(signature.subject, "CN=Лабораторія 7");
+  EXPECT_FALSE(signature.trusted.has_value());
+  // All else is as if it had not been signed.
+  EXPECT_THAT(wrong_with(xml, !schema_folder().empty()), testing::IsEmpty());
+  const auto dcc = read_dcc(xml, "signed.xml");
+  ASSERT_TRUE(dcc);
+  EXPECT_EQ(dcc->hash(dcc_ref::kSelf), dcc_self_hash(xml));
+  EXPECT_EQ(dcc->hash(dcc_ref::kSigner), signature.certificate_sha256);
+  EXPECT_FALSE(found(without_signature(xml)).present);
+}
+
+TEST_F(Signature, RsaGivesTheSameBytes) {
+  const Identity rsa("Lab 8", nullptr, EVP_RSA_gen(2048));
+  const std::string xml = signed_by(rsa);
+  EXPECT_EQ(xml, signed_by(rsa));
+  EXPECT_EQ(found(xml).wrong, "");
+}
+
+TEST_F(Signature, AnyChangeBreaksIt) {
+  const std::string xml = signed_by(lab_);
+  EXPECT_NE(found(replaced(xml, "0.032", "0.033")).wrong, "");
+  EXPECT_NE(found(replaced(xml, "</dcc:administrativeData>", " </dcc:administrativeData>")).wrong,
+            "");
+  // Another's certificate in the place of the signer's.
+  const std::string other = signed_by(Identity("Somebody"));
+  const auto part = [](const std::string& text, const char* name) {
+    const std::size_t begin = text.find(std::string("<ds:") + name);
+    const std::string end = std::string("</ds:") + name + ">";
+    return text.substr(begin, text.find(end) + end.size() - begin);
+  };
+  EXPECT_NE(found(replaced(xml, part(xml, "KeyInfo"), part(other, "KeyInfo"))).wrong, "");
+  // Two of them, or one that covers a part or something else only.
+  const std::string whole =
+      xml.substr(without_signature(xml).rfind("</"), xml.size() - without_signature(xml).size());
+  EXPECT_THAT(found(replaced(xml, whole, whole + whole)).wrong, HasSubstr("several"));
+  EXPECT_THAT(found(replaced(xml, "URI=\"\"", "URI=\"#a\"")).wrong, HasSubstr("part"));
+  EXPECT_THAT(found(replaced(xml, part(xml, "Transforms"), "")).wrong, HasSubstr("not the doc"));
+  EXPECT_THAT(found(replaced(replaced(xml, whole, ""), "</dcc:statements>",
+                             "</dcc:statements><x>" + whole + "</x>"))
+                  .wrong,
+              HasSubstr("not the document's own"));
+}
+
+TEST_F(Signature, IsKnownOrNot) {
+  const Identity authority("Authority");
+  const Identity issued("Lab 9", &authority);
+  const std::string xml = signed_by(issued);
+  EXPECT_EQ(found(xml, issued.certificate_pem()).trusted, true);
+  EXPECT_EQ(found(xml, lab_.certificate_pem() + authority.certificate_pem()).trusted, true);
+  EXPECT_EQ(found(xml, lab_.certificate_pem()).trusted, false);
+  EXPECT_EQ(found(xml, Identity("Authority").certificate_pem()).trusted, false) << "same name";
+  EXPECT_FALSE(check_signature(xml, "no certificate"));
+}
+
+TEST_F(Signature, UnusableKeysAreRefusedBeforehand) {
+  EXPECT_TRUE(read(lab_, lab_, "secret"));
+  EXPECT_THAT(read_signing_key(folder_ / "key.pem", folder_ / "crt.pem", "guess").error().message,
+              HasSubstr("PLUMBLINE_KEY_PASSPHRASE"));
+  EXPECT_THAT(read(Identity("Other"), lab_).error().message, HasSubstr("another key"));
+  EXPECT_THAT(read(Identity("Short", nullptr, EVP_RSA_gen(1024)), lab_).error().message,
+              HasSubstr("2048"));
+  Identity old("Old");
+  old.expire();
+  EXPECT_THAT(read(old, old).error().message, HasSubstr("expired"));
+  EXPECT_FALSE(read_signing_key(folder_ / "absent", folder_ / "crt.pem", ""));
+}
+
 // --- the program ---
 
 class Verify : public testing::Test {
@@ -238,6 +405,38 @@ TEST_F(Verify, XmlHasTheNumbersOfResultJson) {
       EXPECT_DOUBLE_EQ(si->values[j], native->values[j] / kStandardGravity_mps2);
     }
   }
+}
+
+TEST_F(Verify, SignedByTheLaboratory) {
+  const Identity lab("Lab 7"), stranger("Stranger");
+  write_text(folder_ / "lab.key", lab.key_pem());
+  write_text(folder_ / "lab.crt", lab.certificate_pem());
+  write_text(folder_ / "stranger.crt", stranger.certificate_pem());
+  write_text(folder_ / "lab.toml", "[signature]\nkey = \"lab.key\"\ncertificate = \"lab.crt\"\n");
+  const auto known = [&](const char* target, const char* signer) {
+    return run_plumbline({"verify", folder_ / target, "--signer", folder_ / signer});
+  };
+  EXPECT_EQ(known("out", "lab.crt").exit_code, 1) << "it is not signed";
+  calibrate("signed", {});
+  const auto good = known("signed", "lab.crt");
+  EXPECT_EQ(good.exit_code, 0) << good.out << good.err;
+  EXPECT_THAT(good.out, HasSubstr("ok     signature of the whole XML by CN=Lab 7"));
+  EXPECT_EQ(known("signed/certificate.pdf", "lab.crt").exit_code, 0);
+  EXPECT_EQ(known("signed", "stranger.crt").exit_code, 1);
+  EXPECT_EQ(known("signed", "lab.key").exit_code, 2);
+  EXPECT_THAT(text_of(folder_ / "signed/certificate.html"), HasSubstr("with the key of CN=Lab 7"));
+  // Taking the signature off is noticed: the certificate says that it has one.
+  write_text(folder_ / "signed/certificate.xml",
+             without_signature(text_of(folder_ / "signed/certificate.xml")));
+  const auto bare = verify(folder_ / "signed/certificate.xml");
+  EXPECT_EQ(bare.exit_code, 1);
+  EXPECT_THAT(bare.out, HasSubstr("FAILED signature: there is none"));
+  write_text(folder_ / "lab.crt", stranger.certificate_pem());
+  const auto refused = run_plumbline({"calibrate", "--samples", folder_ / "samples.csv", "--config",
+                                      folder_ / "run.toml", "--lab", folder_ / "lab.toml", "--out",
+                                      folder_ / "none"});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.error_lines(), 1) << refused.err;
 }
 
 TEST_F(Verify, EveryChangeIsNoticed) {

@@ -7,9 +7,12 @@
 #include <cstdlib>
 #include <memory>
 
+#include "storage/run_store.h"
+#include "tests/app/http_client.h"
 #include "tests/app/temp_folder.h"
 #include "tests/browser/child.h"
 #include "tests/browser/chromium.h"
+#include "tests/storage/store_fixture.h"
 
 namespace plumbline::browser {
 namespace {
@@ -21,13 +24,20 @@ using app::write_text;
 /// `plumbline serve` as a process.
 class Server {
  public:
-  Server(const TempFolder& folder, const std::string& listen) {
+  Server(const TempFolder& folder, const std::string& listen,
+         const std::vector<std::string>& plans) {
     Pipe out;
-    child_ = std::make_unique<Child>(
-        std::vector<std::string>{PLUMBLINE_BINARY_DIR "/plumbline", "serve", "--db",
-                                 folder / "runs.db", "--listen", listen, "--control", "--simulate",
-                                 "--simulated-config", folder / "rig.toml", "--speed", "30"},
-        std::vector<std::pair<int, int>>{{out.write.get(), 1}});
+    std::vector<std::string> words = {PLUMBLINE_BINARY_DIR "/plumbline",
+                                      "serve",
+                                      "--db",
+                                      folder / "runs.db",
+                                      "--listen",
+                                      listen,
+                                      "--control",
+                                      "--golden",
+                                      "G-1"};
+    words.insert(words.end(), plans.begin(), plans.end());
+    child_ = std::make_unique<Child>(words, std::vector<std::pair<int, int>>{{out.write.get(), 1}});
     out.write = End();
     char c = 0;
     while (::read(out.read.get(), &c, 1) == 1 && c != '\n') url_ += c;
@@ -37,6 +47,7 @@ class Server {
   /// "http://127.0.0.1:40123/"
   const std::string& url() const { return url_; }
   std::string address() const { return url_.substr(7, url_.size() - 8); }
+  int port() const { return std::stoi(url_.substr(url_.rfind(':') + 1)); }
 
  private:
   std::unique_ptr<Child> child_;
@@ -64,7 +75,7 @@ class StationBrowser : public testing::Test {
     rig = replaced(rig, "samples_per_pose = 40", "samples_per_pose = 20");
     rig = replaced(rig, "verification_poses = 24", "verification_poses = 6");
     write_text(folder_ / "rig.toml", rig);
-    server_ = std::make_unique<Server>(folder_, "127.0.0.1:0");
+    start_server("127.0.0.1:0");
     ASSERT_FALSE(server_->url().empty());
     page_ = std::make_unique<Chromium>(chromium_path(), folder_ / "profile");
   }
@@ -74,6 +85,12 @@ class StationBrowser : public testing::Test {
     }
   }
 
+  void start_server(const std::string& listen) {
+    server_ =
+        std::make_unique<Server>(folder_, listen,
+                                 std::vector<std::string>{"--simulate", "--simulated-config",
+                                                          folder_ / "rig.toml", "--speed", "30"});
+  }
   void expect(const std::string& expression, int limit_s = 60) {
     ASSERT_TRUE(page_->wait_for(expression, limit_s)) << expression << "\nthe page shows:\n"
                                                       << page_->value("document.body.innerText");
@@ -108,6 +125,12 @@ TEST_F(StationBrowser, OperatorMeasuresAUnit) {
   // The first ring of twelve poses does not determine the axis that it turns about.
   expect("parseInt(document.getElementById('done').textContent) >= 20");
   keep_picture("running");
+  // Fifteen more look on to the end; the run below is none the worse for it.
+  std::vector<app::Connection> viewers;
+  for (int i = 0; i < 15; ++i) {
+    viewers.emplace_back(server_->port(), 60);
+    viewers.back().send("GET /api/stream HTTP/1.1\r\nHost: " + server_->address() + "\r\n\r\n");
+  }
 
   page_->press("#pause");
   expect("document.getElementById('state').textContent === 'Paused'");
@@ -129,12 +152,20 @@ TEST_F(StationBrowser, OperatorMeasuresAUnit) {
   EXPECT_EQ(page_->value("document.getElementById('state').textContent"), "Finished");
   expect("!document.getElementById('start').hidden");
   keep_picture("verdict");
+  for (app::Connection& viewer : viewers) {
+    EXPECT_NE(viewer.receive_until("\"decision\":\"pass\"").find("\"decision\":\"pass\""),
+              std::string::npos);
+  }
+  viewers.clear();
+  const auto run = page_->value("fetch('/api/runs').then(r => r.json()).then(all => all.runs[0])");
+  EXPECT_EQ(run["poses"], 67);
+  EXPECT_EQ(run["state"], "finished");
 
   // A server that is started anew is found again, and remembers.
   const std::string address = server_->address();
   server_.reset();
   expect("document.body.dataset.link === 'down'");
-  server_ = std::make_unique<Server>(folder_, address);
+  start_server(address);
   ASSERT_EQ(server_->address(), address);
   expect("document.body.dataset.link === 'up'");
   EXPECT_EQ(page_->value("document.getElementById('verdict').textContent"), "PASS");
@@ -154,6 +185,30 @@ TEST_F(StationBrowser, OperatorMeasuresAUnit) {
   EXPECT_EQ(page_->value("document.querySelectorAll('form, input, dialog, nav').length"), 0);
   EXPECT_TRUE(page_->value("document.getElementById('stop') === null").get<bool>());
   keep_picture("kiosk");
+}
+
+// A run that was interrupted is gone on with from the page; what `run --resume` refuses is told.
+TEST_F(StationBrowser, OperatorGoesOnWithAnUnfinishedRun) {
+  {
+    auto store = storage::RunStore::open(folder_ / "runs.db").value();
+    storage::RunHeader header = storage::example_header();
+    header.serial = "A-9";
+    const auto run = store.create_run(header).value();
+    ASSERT_TRUE(store.commit_pose(run, storage::example_pose(0)));
+  }
+  server_ = std::make_unique<Server>(folder_, "127.0.0.1:0",
+                                     std::vector<std::string>{"--config", folder_ / "rig.toml"});
+  page_->go_to(server_->url());
+  expect("document.getElementById('state')?.textContent === 'Interrupted'");
+  expect("document.getElementById('go-on').textContent === 'Go on with run 1 of A-9'");
+  keep_picture("interrupted");
+  page_->press("#go-on");
+  expect("document.activeElement.id === 'start-operator'");
+  page_->type("R. Roe");
+  page_->press("#start-golden");
+  expect("document.getElementById('start-serial').value === 'G-1'");
+  page_->press("#go-on");
+  expect("document.getElementById('start-answer').textContent.includes('another plan')");
 }
 
 }  // namespace

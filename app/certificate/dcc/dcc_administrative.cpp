@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "app/certificate/dcc/dcc_parts.h"
+#include "app/certificate/dcc/signature.h"
 
 namespace plumbline::app::dcc {
 namespace {
@@ -41,6 +42,19 @@ void add_hashes(const Context& c, const XmlElement& core) {
   hash(dcc_ref::kPdf, c.siblings.pdf_pages_sha256, c.tr("pages of certificate.pdf"));
   for (const auto& [name, value] : c.input.provenance.input_sha256) {
     hash(dcc_ref::kInput, value, std::filesystem::path(name).filename().string());
+  }
+  hash(dcc_ref::kChain, c.input.provenance.chain_head, c.tr("Last link of the run's hash chain"));
+  if (c.input.signing != nullptr) {
+    hash(dcc_ref::kSigner, c.input.signing->certificate_sha256,
+         c.tr("certificate of the key that signs this file"));
+  }
+  const Laboratory& lab = c.input.laboratory;
+  if (!lab.number.empty()) {
+    add_identification(c, list, dcc_ref::kNumber, "calibrationLaboratory", lab.number,
+                       c.tr("Number of the certificate"));
+  }
+  if (!lab.order.empty()) {
+    add_identification(c, list, dcc_ref::kOrder, "customer", lab.order, c.tr("Customer's order"));
   }
 }
 
@@ -130,6 +144,10 @@ void add_statements(const Context& c, const XmlElement& parent) {
   }
   add_traceability(c, list, c.tr("Traceability of the angles"), lab.head);
   add_traceability(c, list, c.tr("Traceability of gravity"), lab.gravity);
+  if (!lab.ambient.empty()) {
+    add_statement(c, list, "plumbline_ambientConditions",
+                  c.tr("Conditions in the room") + ": " + lab.ambient);
+  }
   add_statement(c, list, "plumbline_relatesToItemOnly", c.document.colophon);
   if (performance_dates(c.input).from.empty()) {
     add_statement(c, list, "plumbline_datesNotStated",
@@ -160,6 +178,7 @@ void add_administrative_data(const Context& c, const XmlElement& root) {
   c.text(person.add("dcc:person"), "dcc:name", or_not_stated(c, lab.authorised_by));
   if (!lab.authorised_role.empty()) person.add("dcc:role", lab.authorised_role);
   person.add("dcc:mainSigner", "true");
+  if (c.input.signing != nullptr) person.add("dcc:cryptElectronicSeal", "true");
   add_contact(c, data.add("dcc:customer"), lab.customer);
   add_statements(c, data);
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "app/certificate/dcc/dcc_parts.h"
+#include "app/certificate/dcc/signature.h"
 #include "app/io/sha256.h"
 
 namespace plumbline::app {
@@ -52,9 +53,9 @@ std::size_t own_hash_place(std::string_view xml) {
 }  // namespace
 
 std::string dcc_self_hash(std::string_view xml) {
-  const std::size_t place = own_hash_place(xml);
+  std::string blank = without_signature(xml);
+  const std::size_t place = own_hash_place(blank);
   if (place == std::string_view::npos) return {};
-  std::string blank(xml);
   blank.replace(place, kHashDigits, dcc::kNoHash);
   return sha256(blank);
 }

@@ -21,6 +21,10 @@ inline constexpr const char* kWords = "plumbline_wordsSha256";
 inline constexpr const char* kResult = "plumbline_resultSha256";
 inline constexpr const char* kHtml = "plumbline_htmlSha256";
 inline constexpr const char* kPdf = "plumbline_pdfPagesSha256";
+inline constexpr const char* kChain = "plumbline_chainHeadSha256";
+inline constexpr const char* kSigner = "plumbline_signerSha256";
+inline constexpr const char* kNumber = "plumbline_laboratoryNumber";
+inline constexpr const char* kOrder = "plumbline_customerOrder";
 inline constexpr const char* kInput = "plumbline_inputSha256";
 inline constexpr const char* kSensitivity = "plumbline_sensitivity";
 inline constexpr const char* kOffset = "plumbline_offset";
@@ -36,8 +40,8 @@ inline constexpr const char* kUnknownCountry = "ZZ";
 std::string write_dcc(const CertificateInput& input, const Document& document,
                       const Siblings& siblings);
 
-/// SHA-256 of a certificate.xml with its own hash replaced by zeros; what the file states as
-/// kSelf. Empty when the file states none.
+/// SHA-256 of a certificate.xml without its signature and with its own hash replaced by zeros; what
+/// the file states as kSelf. Empty when the file states none.
 std::string dcc_self_hash(std::string_view xml);
 
 }  // namespace plumbline::app

@@ -145,7 +145,7 @@ export function drawMap(canvas, plan, poses, axis, aim) {
   return known.length ? full : null;
 }
 
-// Chart of individuals: values with ± U bars, mean and control limits.
+// Chart of individuals and moving ranges: values with ± U bars, mean and control limits.
 export function drawTrend(canvas, series) {
   const to = surface(canvas);
   if (!to) return;
@@ -159,18 +159,41 @@ export function drawTrend(canvas, series) {
   const pad = (high - low) * 0.08 || Math.abs(high) * 1e-6 || 1e-9;
   low -= pad; high += pad;
   const list = ticks(low, high, 4);
-  const left = Math.max(...list.map((v) => c.measureText(label(v, list)).width)) + 10;
-  const box = {left, right: 40, top: 8, bottom: 20};
+  // Below, on a scale of their own, the moving ranges.
+  const ranges = chart?.range ?? [];
+  const most = Math.max(chart?.upper_range ?? 0, ...ranges) * 1.1 || 1;
+  const steps = ticks(0, most, 2);
+  const widest = (values) => Math.max(0, ...values.map((v) => c.measureText(label(v, values)).width));
+  const left = Math.max(widest(list), widest(steps)) + 10;
+  const strip = ranges.length ? height * 0.24 : 0;
+  const box = {left, right: 40, top: 8, bottom: 20 + (strip ? strip + 14 : 0)};
   const xAt = (i) => box.left + (i + 0.5) / points.length * (width - box.left - box.right);
   const yAt = scale(low, high, height - box.bottom, box.top);
   frame(to, box, {list: [], at: xAt}, {list, at: yAt}, "", "");
-  const line = (v, dash, name, text) => {
+  const line = (v, dash, name, text, at = yAt) => {
     if (v === null || v === undefined) return;
     c.strokeStyle = colour(name); c.lineWidth = 1.4; c.setLineDash(dash);
-    c.beginPath(); c.moveTo(box.left, yAt(v)); c.lineTo(width - box.right, yAt(v)); c.stroke();
+    c.beginPath(); c.moveTo(box.left, at(v)); c.lineTo(width - box.right, at(v)); c.stroke();
     c.setLineDash([]); c.fillStyle = colour(name); c.textAlign = "left"; c.textBaseline = "middle";
-    c.fillText(text, width - box.right + 4, yAt(v));
+    c.fillText(text, width - box.right + 4, at(v));
   };
+  if (strip) {
+    const below = {left, right: 40, top: height - 20 - strip, bottom: 20};
+    const rangeAt = scale(0, most, height - below.bottom, below.top);
+    frame(to, below, {list: [], at: xAt}, {list: steps, at: rangeAt}, "", "");
+    line(chart.mean_range, [], "quiet", "MR", rangeAt);
+    line(chart.upper_range, [6, 4], "warn", "UCL", rangeAt);
+    c.strokeStyle = c.fillStyle = colour("accent"); c.lineWidth = 1;
+    c.beginPath();
+    ranges.forEach((r, i) => { if (i) c.lineTo(xAt(i + 1), rangeAt(r)); else c.moveTo(xAt(1), rangeAt(r)); });
+    c.stroke();
+    ranges.forEach((r, i) => {
+      c.fillStyle = r > chart.upper_range ? colour("bad") : colour("accent");
+      c.beginPath();
+      if (r > chart.upper_range) c.rect(xAt(i + 1) - 4, rangeAt(r) - 4, 8, 8); else c.arc(xAt(i + 1), rangeAt(r), 3, 0, 7);
+      c.fill();
+    });
+  }
   if (chart) {
     line(chart.mean, [], "quiet", "x̄");
     line(chart.lower, [6, 4], "warn", "LCL"); line(chart.upper, [6, 4], "warn", "UCL");

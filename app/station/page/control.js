@@ -1,5 +1,6 @@
 // Orders and the form that starts runs. Not part of the kiosk view.
 import {ask} from "/app.js";
+import {newest} from "/live.js";
 
 const id = (name) => document.getElementById(name);
 let station = null;
@@ -14,11 +15,14 @@ async function look() {
   if (select.length !== station.plans.length) {
     select.replaceChildren(...station.plans.map((plan) => new Option(plan, plan)));
   }
+  id("start-golden").hidden = !station.golden;
+  id("start-golden").textContent = `Golden unit ${station.golden}`;
   arrange();
 }
 
 let phase = "";
 let status = null;
+let run = null;
 function arrange() {
   const control = station?.control ?? false;
   const running = phase === "running";
@@ -29,6 +33,10 @@ function arrange() {
   if (wasHidden && !id("start").hidden) id("start-serial").focus();
   id("pause").disabled = status?.state === "paused" || status?.pause_requested !== "none";
   id("resume").disabled = status?.state !== "paused" && status?.pause_requested === "none";
+  const unfinished = control && Boolean(run?.id) && ["interrupted", "stopped", "failed"].includes(phase)
+    && station.resumable.length > 0 && !station.last_start?.running;
+  id("unfinished").hidden = !unfinished;
+  if (unfinished) id("go-on").textContent = `Go on with run ${run.id} of ${run.serial}`;
   const failed = station?.last_start?.message;
   if (failed && !running) id("start-answer").textContent = `The last start ended: ${failed}`;
 }
@@ -81,13 +89,30 @@ id("start").addEventListener("submit", async (event) => {
     await look();
   }
 });
+// The golden unit is measured like any other, only more often.
+id("start-golden").addEventListener("click", () => {
+  id("start-serial").value = station.golden;
+  (id("start-operator").value.trim() ? id("start-go") : id("start-operator")).focus();
+});
+id("go-on").addEventListener("click", async () => {
+  const operator = id("start-operator").value.trim();
+  if (!operator) {
+    id("go-on-answer").textContent = "Who measures? Fill in the operator below.";
+    id("start-operator").focus();
+    return;
+  }
+  const chosen = id("start-plan").value;
+  const plan = station.resumable.includes(chosen) ? chosen : station.resumable[0];
+  if (await act("/api/start", {serial: run.serial, operator, plan, resume: true}, id("go-on-answer"))) await look();
+});
 id("start-operator").value = localStorage.getItem("operator") ?? "";
 
-window.addEventListener("live", (event) => {
-  const other = phase !== event.detail.phase;
-  phase = event.detail.phase;
-  status = event.detail.status;
+function take(message) {
+  const other = phase !== message.phase;
+  ({phase, status, run} = message);
   if (other) look(); else arrange();
-});
+}
+window.addEventListener("live", (event) => take(event.detail));
 setInterval(() => { if (station?.last_start?.running) look(); }, 1000);
-look();
+// What came before this part of the page was loaded; where nothing goes on, nothing more may come.
+if (newest()) take(newest()); else look();

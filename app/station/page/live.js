@@ -37,6 +37,9 @@ let posesVersion = -1;
 let axis = 0;
 let dirty = true;
 
+// The last message; null before the first one.
+export const newest = () => live;
+
 export const decisionWords = (decision) => decisions[decision] ?? [decision, "none"];
 
 export function clock(seconds) {
