@@ -13,6 +13,7 @@
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
+#include <thread>
 
 #include "rig/sim/head_errors.h"
 #include "rig/sim/world.h"
@@ -65,8 +66,14 @@ std::string ShortPlan::text() const {
 
 std::size_t ShortPlan::poses() const { return static_cast<std::size_t>(deltas * h_rows + 1); }
 
+void beside_each_other(int lanes, const std::function<void(int)>& lane) {
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < lanes; ++i) threads.emplace_back([&lane, i] { lane(i); });
+}
+
 void Complaints::add(const std::string& when, const std::string& what) {
-  fmt::print("{}: {}: {}\n", battery_, when, what);
+  // One call, one line: lanes may complain at the same time.
+  fmt::print("{}", fmt::format("{}: {}: {}\n", battery_, when, what));
   std::fflush(stdout);
   ++count_;
 }

@@ -4,7 +4,9 @@
 
 #include <sys/types.h>
 
+#include <atomic>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -35,7 +37,10 @@ struct ShortPlan {
   std::size_t poses() const;  ///< the soak included
 };
 
-/// Counts and prints what is wrong.
+/// Runs `lane(0)` … `lane(lanes − 1)` beside each other: most of a battery's time is waiting.
+void beside_each_other(int lanes, const std::function<void(int)>& lane);
+
+/// Counts and prints what is wrong. Thread safe.
 class Complaints {
  public:
   explicit Complaints(std::string battery) : battery_(std::move(battery)) {}
@@ -46,7 +51,7 @@ class Complaints {
 
  private:
   std::string battery_;
-  int count_ = 0;
+  std::atomic<int> count_ = 0;
 };
 
 struct RigChoice {

@@ -11,6 +11,7 @@
 #include <chrono>
 #include <random>
 #include <thread>
+#include <vector>
 
 #include "tests/battery/battery.h"
 
@@ -80,20 +81,24 @@ int systematic(int h_rows, int most, double speed, const std::string& place) {
   return complaints.exit_code();
 }
 
-int random_moments(int count, bool while_resuming, std::uint64_t seed, double speed,
-                   const std::string& place) {
+struct Kills {
+  int kills = 0;
+  int runs = 0;
+};
+
+Kills random_moments(int count, bool while_resuming, std::uint64_t seed, double speed,
+                     const std::string& place, Complaints& complaints) {
   const TempFolder folder(place);
   const Bench bench(folder, {.plan = kSmall.text(), .speed = speed});
   std::mt19937_64 random(seed);
-  Complaints complaints("battery-kill");
   int kills = 0;
   int runs = 0;
   std::map<long long, std::string> kept;
   // How long a run takes on this machine: the moments lie within.
   const auto begin = std::chrono::steady_clock::now();
-  check_end(Program(bench, folder / "whole.db", folder, false).wait(), complaints,
-            "run without a kill");
-  if (complaints.count() > 0) return 1;  // nothing would be killed
+  const Ended whole = Program(bench, folder / "whole.db", folder, false).wait();
+  check_end(whole, complaints, "run without a kill");
+  if (whole.code != 0 && whole.code != 1) return {};  // nothing would be killed
   const double run_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
   auto database = folder / "run0.db";
@@ -105,7 +110,7 @@ int random_moments(int count, bool while_resuming, std::uint64_t seed, double sp
     const auto until =
         std::chrono::steady_clock::now() + std::chrono::duration<double, std::milli>(wait_ms);
     while (program.running() && std::chrono::steady_clock::now() < until) {
-      std::this_thread::sleep_for(std::chrono::microseconds(200));
+      std::this_thread::sleep_for(std::chrono::microseconds(500));
     }
     const bool counts = program.running() && (!while_resuming || resume);
     if (program.running()) ::kill(program.process(), SIGKILL);
@@ -126,11 +131,28 @@ int random_moments(int count, bool while_resuming, std::uint64_t seed, double sp
     resume = false;
     std::filesystem::remove(database);
     database = folder / fmt::format("run{}.db", runs);
-    if (runs % 50 == 0) fmt::print("battery-kill: {} kills, {} runs completed\n", kills, runs);
+    if (runs % 10 == 0) fmt::print("battery-kill: {} kills, {} runs completed\n", kills, runs);
     std::fflush(stdout);
   }
+  return {kills, runs};
+}
+
+int random_moments(int count, int jobs, bool while_resuming, std::uint64_t seed, double speed,
+                   const std::string& place) {
+  Complaints complaints("battery-kill");
+  std::vector<Kills> lanes(static_cast<std::size_t>(jobs));
+  beside_each_other(jobs, [&](int lane) {
+    const int share = count / jobs + (lane < count % jobs ? 1 : 0);
+    lanes[static_cast<std::size_t>(lane)] = random_moments(
+        share, while_resuming, seed + static_cast<std::uint64_t>(lane), speed, place, complaints);
+  });
+  Kills all;
+  for (const Kills& lane : lanes) {
+    all.kills += lane.kills;
+    all.runs += lane.runs;
+  }
   fmt::print("battery-kill {}: {} kills, {} runs completed, {} faults\n",
-             while_resuming ? "resume" : "random", kills, runs, complaints.count());
+             while_resuming ? "resume" : "random", all.kills, all.runs, complaints.count());
   return complaints.exit_code();
 }
 
@@ -146,12 +168,16 @@ int main(int argc, char** argv) {
   double speed = 200;
   std::uint64_t seed = 1;
   std::string place = "/tmp";
+  int jobs = 1;
   CLI::App* systematic = app.add_subcommand("systematic");
   systematic->add_option("--h-rows", h_rows)->check(CLI::Range(1, 9));
   systematic->add_option("--most", most, "stop after so many kills");
   CLI::App* random = app.add_subcommand("random");
   CLI::App* resume = app.add_subcommand("resume");
-  for (CLI::App* sub : {random, resume}) sub->add_option("--count", count);
+  for (CLI::App* sub : {random, resume}) {
+    sub->add_option("--count", count);
+    sub->add_option("--jobs", jobs, "so many rigs beside each other")->check(CLI::Range(1, 64));
+  }
   for (CLI::App* sub : {systematic, random, resume}) {
     sub->add_option("--speed", speed);
     sub->add_option("--seed", seed);
@@ -159,5 +185,5 @@ int main(int argc, char** argv) {
   }
   CLI11_PARSE(app, argc, argv);
   if (systematic->parsed()) return plumbline::battery::systematic(h_rows, most, speed, place);
-  return plumbline::battery::random_moments(count, resume->parsed(), seed, speed, place);
+  return plumbline::battery::random_moments(count, jobs, resume->parsed(), seed, speed, place);
 }

@@ -13,9 +13,11 @@
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <mutex>
 #include <random>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "tests/battery/battery.h"
 
@@ -47,6 +49,16 @@ struct Counts {
   std::map<std::string, int> when;  ///< states of the engine in which the first of them came
   int poses = 0;
   int wrong = 0;
+
+  void add(const Counts& more) {
+    runs += more.runs;
+    finished += more.finished;
+    ended_safely += more.ended_safely;
+    noticed += more.noticed;
+    for (const auto& [state, times] : more.when) when[state] += times;
+    poses += more.poses;
+    wrong += more.wrong;
+  }
 };
 
 /// The state in which the first fault was noticed; empty when none was.
@@ -77,7 +89,7 @@ void run_case(const Case& one, double speed, bool rtu, std::uint64_t seed, const
   if (one.resuming) {
     Program program(bench, database, folder, false);
     while (program.running() && audit(database).poses.size() < kPlan.poses() / 2) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     ::kill(program.process(), SIGTERM);
     program.wait();
@@ -273,6 +285,7 @@ int main(int argc, char** argv) {
   bool rtu = false;
   std::uint64_t seed = 1;
   std::string place = "/tmp";
+  int jobs = 1;
   CLI::App* modbus = app.add_subcommand("modbus");
   CLI::App* drive = app.add_subcommand("drive");
   CLI::App* can = app.add_subcommand("can");
@@ -282,20 +295,33 @@ int main(int argc, char** argv) {
     sub->add_option("--speed", speed);
     sub->add_option("--seed", seed);
     sub->add_option("--in", place, "where the databases are");
+    sub->add_option("--jobs", jobs, "so many runs beside each other")->check(CLI::Range(1, 64));
   }
   CLI11_PARSE(app, argc, argv);
   std::mt19937_64 random(seed);
   Counts counts;
   Complaints complaints("battery-wire");
+  std::vector<Case> cases;
   for (int i = 0; i < count; ++i) {
-    const Case one = modbus->parsed()  ? (i % 15 == 14 ? swapped_words(i / 15 % 2 == 1)
-                                                       : modbus_case(i - i / 15, random))
-                     : drive->parsed() ? drive_case(i, random)
-                                       : can_case(i, random);
-    run_case(one, speed, rtu, seed + static_cast<std::uint64_t>(i), place, counts, complaints);
-    if ((i + 1) % 10 == 0) fmt::print("battery-wire: {} runs\n", i + 1);
-    std::fflush(stdout);
+    cases.push_back(modbus->parsed()  ? (i % 15 == 14 ? swapped_words(i / 15 % 2 == 1)
+                                                      : modbus_case(i - i / 15, random))
+                    : drive->parsed() ? drive_case(i, random)
+                                      : can_case(i, random));
   }
+  std::mutex mutex;
+  std::size_t next = 0;
+  beside_each_other(jobs, [&](int) {
+    for (std::unique_lock lock(mutex); next < cases.size();) {
+      const std::size_t i = next++;
+      lock.unlock();
+      Counts of_this;
+      run_case(cases[i], speed, rtu, seed + i, place, of_this, complaints);
+      lock.lock();
+      counts.add(of_this);
+      if ((i + 1) % 10 == 0) fmt::print("battery-wire: {} runs\n", i + 1);
+      std::fflush(stdout);
+    }
+  });
   std::string when;
   for (const auto& [state, runs] : counts.when) {
     when += fmt::format("{}{} {}", when.empty() ? "" : "; ", state, runs);
