@@ -142,7 +142,7 @@ void add_dwell_response(const Baseline& base, const ActiveEffect& active,
     const TermInput input{
         base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
     const Eigen::VectorXd contrasts = dwell_contrasts_V(input, active);
-    for (Eigen::Index d = 0; d < kDwellContrasts; ++d) change(d * n + k) = contrasts(d);
+    for (Eigen::Index d = 0; d < contrasts.size(); ++d) change(d * n + k) = contrasts(d);
   }
 }
 
@@ -177,8 +177,8 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
     const Eigen::Index columns = std::ssize(singles[g]);
     group.first_row = first_axis * n;
     group.means = Eigen::MatrixXd::Zero(of_head ? mean_rows(log) : n, columns);
-    group.first_dwell_row = mean_rows(log) + first_axis * kDwellContrasts * n;
-    group.dwells = Eigen::MatrixXd::Zero(within_dwell ? kDwellContrasts * n : 0, columns);
+    group.first_dwell_row = mean_rows(log) + first_axis * log.dwell_contrasts() * n;
+    group.dwells = Eigen::MatrixXd::Zero(within_dwell ? log.dwell_contrasts() * n : 0, columns);
     for_column_blocks(columns, [&](Eigen::Index first, Eigen::Index count) {
       auto block = group.means.middleCols(first, count);
       for (Eigen::Index j = 0; j < count; ++j) {
@@ -195,7 +195,7 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
         whitening.lower[i].triangularView<Eigen::Lower>().solveInPlace(rows);
       }
     });
-    for (Eigen::Index d = 0; within_dwell && d < kDwellContrasts; ++d)
+    for (Eigen::Index d = 0; within_dwell && d < log.dwell_contrasts(); ++d)
       group.dwells.middleRows(d * n, n) /= whitening.dwell_sd_V[axis](d);
   }
   return responses;

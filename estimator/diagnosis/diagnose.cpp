@@ -33,11 +33,13 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log, const Enlarg
   const ActiveEffect& active = fit.parameters.effects[effect];
   const auto infos = active.effect->parameters();
   const std::vector<double> u = uncertainties(fit, effect);
+  std::vector<double> values = active.p;
+  active.effect->normalise(values);
   std::vector<EffectParameter> reported;
   for (std::size_t k = 0; k < infos.size(); ++k) {
     // An amplitude that this hypothesis leaves out is no result.
     if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
-    EffectParameter parameter{infos[k].name, std::nullopt, active.p[k], u[k], infos[k].unit};
+    EffectParameter parameter{infos[k].name, std::nullopt, values[k], u[k], infos[k].unit};
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
     if (infos[k].role == ParameterRole::index && infos[k].unit == "s") {
       // The instant lies somewhere between the last sample before and the first one after.

@@ -14,6 +14,7 @@ constexpr Eigen::Index kAxes = static_cast<Eigen::Index>(kAxisCount);
 
 // A step that changes the prediction well above rounding and well below curvature.
 double difference_step(const ParameterInfo& info, double value) {
+  if (info.step > 0) return info.step;
   if (info.role == ParameterRole::shape) return 1e-3 * std::max(std::abs(value), 1e-9);
   // Amplitudes: terms of 1e-5 g, angles of 1e-5 degrees and the like.
   return std::max(1e-3 * std::abs(value), 1e-6);
@@ -150,7 +151,7 @@ Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& ac
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
                                           const EnlargedParameters& parameters) {
   PerAxis<Eigen::MatrixXd> dwell_V;
-  dwell_V.fill(Eigen::MatrixXd::Zero(std::ssize(log.visits), kDwellContrasts));
+  dwell_V.fill(Eigen::MatrixXd::Zero(std::ssize(log.visits), log.dwell_contrasts()));
   if (std::none_of(parameters.effects.begin(), parameters.effects.end(),
                    [](const ActiveEffect& a) { return a.effect->within_dwell(); }))
     return dwell_V;
@@ -171,7 +172,7 @@ Observations observe(const MeasurementSet& set, const VisitLog& log) {
   const auto n = std::ssize(set.poses);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     observed.mean_V[i].resize(n);
-    observed.dwell_V[i].resize(n, kDwellContrasts);
+    observed.dwell_V[i].resize(n, log.dwell_contrasts());
     for (Eigen::Index k = 0; k < n; ++k) {
       const Pose& pose = set.poses[static_cast<std::size_t>(k)];
       const Eigen::Map<const Eigen::VectorXd> dwell_V(set.samples.u_V[i].data() + pose.first,
@@ -184,7 +185,9 @@ Observations observe(const MeasurementSet& set, const VisitLog& log) {
 }
 
 Eigen::Index mean_rows(const VisitLog& log) { return kAxes * std::ssize(log.visits); }
-Eigen::Index stacked_rows(const VisitLog& log) { return (1 + kDwellContrasts) * mean_rows(log); }
+Eigen::Index stacked_rows(const VisitLog& log) {
+  return (1 + log.dwell_contrasts()) * mean_rows(log);
+}
 
 namespace {
 
@@ -204,11 +207,12 @@ bool keeps_signs(const EnlargedParameters& trial, const EnlargedParameters& now)
 Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
                         const PerAxis<Eigen::MatrixXd>& dwell_V) {
   const Eigen::Index n = mean_V[0].size();
-  Eigen::VectorXd all((1 + kDwellContrasts) * kAxes * n);
+  const Eigen::Index contrasts = dwell_V[0].cols();
+  Eigen::VectorXd all((1 + contrasts) * kAxes * n);
   for (Eigen::Index i = 0; i < kAxes; ++i) {
     const auto axis = static_cast<std::size_t>(i);
     all.segment(i * n, n) = mean_V[axis];
-    all.segment((kAxes + i * kDwellContrasts) * n, kDwellContrasts * n) = dwell_V[axis].reshaped();
+    all.segment((kAxes + i * contrasts) * n, contrasts * n) = dwell_V[axis].reshaped();
   }
   return all;
 }
@@ -256,8 +260,9 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
     const auto i = static_cast<Eigen::Index>(axis);
     auto means = whitened.middleRows(i * n, n);
     lower[axis].triangularView<Eigen::Lower>().solveInPlace(means);
-    for (Eigen::Index d = 0; d < kDwellContrasts; ++d)
-      whitened.middleRows((kAxes + i * kDwellContrasts + d) * n, n) /= dwell_sd_V[axis](d);
+    const Eigen::Index contrasts = dwell_sd_V[axis].size();
+    for (Eigen::Index d = 0; d < contrasts; ++d)
+      whitened.middleRows((kAxes + i * contrasts + d) * n, n) /= dwell_sd_V[axis](d);
   });
   return whitened;
 }

@@ -45,7 +45,7 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 /// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
 
-/// Predicted contrasts of the dwells, V, n × kDwellContrasts per axis.
+/// Predicted contrasts of the dwells, V, n × log.dwell_contrasts() per axis.
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
                                           const EnlargedParameters& parameters);
 
@@ -55,7 +55,7 @@ Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& ac
 /// What is measured at n visits: the means, and what the samples say beyond them.
 struct Observations {
   PerAxis<Eigen::VectorXd> mean_V;
-  PerAxis<Eigen::MatrixXd> dwell_V;  ///< contrasts of the dwells, n × kDwellContrasts
+  PerAxis<Eigen::MatrixXd> dwell_V;  ///< contrasts of the dwells, n × their number
 };
 Observations observe(const MeasurementSet& set, const VisitLog& log);
 
@@ -72,7 +72,7 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
 /// of the contrasts, which are independent from visit to visit.
 struct PoseWhitening {
   PerAxis<Eigen::MatrixXd> lower;
-  PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< kDwellContrasts each
+  PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< one a contrast
   /// Whitens a matrix of stacked rows.
   Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
 };

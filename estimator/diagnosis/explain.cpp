@@ -152,8 +152,11 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
         gains.push_back(0);
         continue;
       }
-      const double gain = heldout_gain(heldout_mps2(heldout, partitions, without), with, floor_mps2,
-                                       axes_of(removed));
+      // What changes within the dwell may hardly be seen in the means.
+      const double gain = std::max(heldout_gain(heldout_mps2(heldout, partitions, without), with,
+                                                floor_mps2, axes_of(removed)),
+                                   heldout_dwell_gain(search.log, found.observed, found.whitening,
+                                                      found.fit, k, partitions));
       // One pose's own error cannot be predicted from other poses.
       const bool own = removed.effect->id() == "rig.pose_outlier" || removed.effect->certain();
       if (gain > 0 || own) {

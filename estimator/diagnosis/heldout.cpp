@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/heldout.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <limits>
 
 #include "estimator/linear_algebra.h"
@@ -106,6 +107,35 @@ std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
     leave_out(partitions[part][b], result[part]);
   });
   return result;
+}
+
+double heldout_dwell_gain(const VisitLog& log, const Observations& observed,
+                          const PoseWhitening& whitening, const EnlargedFit& fit, std::size_t k,
+                          const std::vector<Blocks>& partitions) {
+  const ActiveEffect& active = fit.parameters.effects[k];
+  if (!active.effect->within_dwell()) return 0;
+  EnlargedParameters fewer = fit.parameters;
+  fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
+  const Eigen::MatrixXd without_V = predict_dwells_V(log, fewer)[active.axis];
+  const auto weights = whitening.dwell_sd_V[active.axis].cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd left = (observed.dwell_V[active.axis] - without_V) * weights;
+  const Eigen::MatrixXd response =
+      (predict_dwells_V(log, fit.parameters)[active.axis] - without_V) * weights;
+  const double all_seen = left.cwiseProduct(response).sum(), all = response.squaredNorm();
+  double before = 0, after = 0;
+  for (const Blocks& blocks : partitions) {
+    for (const std::vector<Eigen::Index>& block : blocks) {
+      const Eigen::MatrixXd here = left(block, Eigen::all);
+      const Eigen::MatrixXd model = response(block, Eigen::all);
+      const double others = all - model.squaredNorm();
+      if (!(others > 0)) continue;
+      const double size = (all_seen - here.cwiseProduct(model).sum()) / others;
+      before += here.squaredNorm();
+      after += (here - size * model).squaredNorm();
+    }
+  }
+  const double expected = static_cast<double>(partitions.size()) * static_cast<double>(left.size());
+  return (before - after) / std::max({before - expected, before - after, 1e-12 * before});
 }
 
 }  // namespace plumbline

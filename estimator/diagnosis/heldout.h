@@ -26,4 +26,11 @@ class Heldout {
   PerAxis<Eigen::MatrixXd> inverse_;  ///< of the covariance of the pose means
 };
 
+/// Share of what effect `k` of a fitted model has to explain within the dwells (sum of squares of
+/// the whitened contrasts beyond noise) that it explains on visits which its size was not taken
+/// from. 0 for an effect that is constant within the dwells. `whitening` is that of the fit.
+double heldout_dwell_gain(const VisitLog& log, const Observations& observed,
+                          const PoseWhitening& whitening, const EnlargedFit& fit, std::size_t k,
+                          const std::vector<Blocks>& partitions);
+
 }  // namespace plumbline

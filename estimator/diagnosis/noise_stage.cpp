@@ -34,8 +34,8 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
   const auto predicted = predict_dwells_V(input.log, parameters);
   PerAxis<Eigen::VectorXd> sd_V;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    sd_V[i].resize(kDwellContrasts);
-    for (Eigen::Index d = 0; d < kDwellContrasts; ++d) {
+    sd_V[i].resize(input.log.dwell_contrasts());
+    for (Eigen::Index d = 0; d < sd_V[i].size(); ++d) {
       const Eigen::ArrayXd off =
           (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).array().abs();
       const auto count = static_cast<double>(off.size());

@@ -6,28 +6,47 @@
 namespace plumbline {
 namespace {
 
+constexpr double kTurn_rad = 2 * std::numbers::pi;
+
 // Mains pickup: A·sin(2πft + φ) in every sample. It lives inside the dwell; in the means only what
-// averaging leaves of it is seen, so the frequency comes from the samples (diagnosis/dwell.h).
+// averaging leaves of it is seen. A sampled line cannot be told from its alias, so f is at most
+// half the sampling rate.
 class MainsPickup final : public Effect {
  public:
   std::string id() const override { return "adc.mains_pickup"; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"amplitude_sin", "g", ParameterRole::amplitude},
-            {"amplitude_cos", "g", ParameterRole::amplitude},
-            {"f", "Hz", ParameterRole::shape}};
+    // Over a run of hours the phase at its end must change by little only.
+    return {{"amplitude", "g", ParameterRole::amplitude},
+            {"f", "Hz", ParameterRole::shape, 1e-7},
+            {"phase", "deg", ParameterRole::shape, 1e-2}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override { return {}; }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
+    const auto& line = log.line[axis];
+    if (!line) return {};
+    // The fit keeps the sign of a shape: from half a turn up no phase comes near zero.
+    const double phase_deg = line->phase_rad / effect::kRadPerDeg;
+    return {{{effect::kSmallTerm, line->f_hz, phase_deg < 180 ? phase_deg + 360 : phase_deg}}};
+  }
   double term_g(const TermInput& input, const double* p) const override {
     const Visit& visit = input.at();
-    const double omega = 2 * std::numbers::pi * p[2];
     const auto n = static_cast<double>(visit.count);
     // Mean of n equally spaced values of a sine: Dirichlet's kernel about the middle of the dwell.
-    const double half = 0.5 * omega * visit.step_s;
+    const double half = 0.5 * kTurn_rad * p[1] * visit.step_s;
     const double kernel =
         std::abs(std::sin(half)) < 1e-12 ? 1 : std::sin(n * half) / (n * std::sin(half));
-    const double phase = omega * (visit.t_arrival_s + 0.5 * (n - 1) * visit.step_s);
-    return kernel * (p[0] * std::sin(phase) + p[1] * std::cos(phase));
+    return kernel * sample_term_g(input, p, 0.5 * (n - 1) * visit.step_s);
+  }
+  void normalise(std::vector<double>& p) const override {
+    if (p[0] < 0) p[2] += 180;
+    p[0] = std::abs(p[0]);
+    p[2] -= 360 * std::floor(p[2] / 360);
+  }
+  bool within_dwell() const override { return true; }
+  double sample_term_g(const TermInput& input, const double* p,
+                       double since_arrival_s) const override {
+    const double turns = p[1] * (input.at().t_arrival_s + since_arrival_s) + p[2] / 360;
+    return p[0] * std::sin(kTurn_rad * turns);
   }
 };
 

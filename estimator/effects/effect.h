@@ -27,6 +27,7 @@ struct ParameterInfo {
   std::string name;  ///< as in result.json
   std::string unit;
   ParameterRole role = ParameterRole::amplitude;
+  double step = 0;  ///< over which the response is differentiated; 0: fitted to role and value
 };
 
 /// Where the search begins: shapes and indices at given values, amplitudes at a small typical size
@@ -78,6 +79,9 @@ class Effect {
   virtual bool certain() const { return false; }
   /// Whether it may stand in a model more than once for one axis: at another pose, say.
   virtual bool repeats() const { return false; }
+  /// The same response by parameters as one would state them: positive amplitudes, angles within
+  /// one turn.
+  virtual void normalise(std::vector<double>&) const {}
   /// What belonged to one run only does not carry over to another set of the same unit.
   virtual bool carries_over() const { return true; }
 };

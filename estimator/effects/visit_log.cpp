@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "estimator/fit/rounding.h"
+#include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
@@ -66,13 +67,36 @@ double input_scatter_V(const MeasurementSet& set, const VisitLog& log, std::size
   return sd_before_rounding_V(lsb_V, quiet_scatter_V(set, axis));
 }
 
+Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<DwellLine>>& lines) {
+  Eigen::MatrixXd contrasts = step_contrasts(visit.count);
+  for (const auto& line : lines) {
+    if (!line) continue;
+    const Eigen::ArrayXd phase =
+        2 * std::numbers::pi * line->f_hz * visit.step_s *
+        Eigen::ArrayXd::LinSpaced(contrasts.rows(), 0, static_cast<double>(visit.count - 1));
+    for (Eigen::VectorXd column : {phase.sin().matrix().eval(), phase.cos().matrix().eval()}) {
+      constexpr double kResolved = 1e-3;  // of its length, beside the columns before it
+      const double length = column.norm();
+      column.array() -= column.mean();
+      for (int twice = 0; twice < 2; ++twice)
+        column -= contrasts * (contrasts.transpose() * column);
+      const bool resolved = column.norm() > kResolved * length;
+      contrasts.conservativeResize(Eigen::NoChange, contrasts.cols() + 1);
+      contrasts.rightCols<1>() =
+          resolved ? column.normalized().eval() : Eigen::VectorXd::Zero(contrasts.rows()).eval();
+    }
+  }
+  return contrasts;
+}
+
 }  // namespace
 
-Eigen::MatrixXd dwell_contrasts(std::size_t samples) {
+Eigen::MatrixXd step_contrasts(std::size_t samples) {
+  constexpr int kSteps = 5;
   const auto n = static_cast<Eigen::Index>(samples);
-  Eigen::MatrixXd contrasts = Eigen::MatrixXd::Zero(n, kDwellContrasts);
+  Eigen::MatrixXd contrasts = Eigen::MatrixXd::Zero(n, kSteps);
   Eigen::Index used = 0, edge = 0;
-  for (int halvings = static_cast<int>(kDwellContrasts); halvings > 0; --halvings) {
+  for (int halvings = kSteps; halvings > 0; --halvings) {
     const Eigen::Index next = n >> halvings;
     if (next <= edge) continue;
     edge = next;
@@ -107,8 +131,6 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     visit.delta_rad = pose.delta_deg * kRadPerDeg;
     visit.h_rad = pose.h_deg * kRadPerDeg;
     visit.count = pose.count;
-    if (!log.contrasts.contains(pose.count))
-      log.contrasts.emplace(pose.count, dwell_contrasts(pose.count));
     visit.t_arrival_s = samples.t_s[pose.first];
     visit.step_s = pose.count > 1 ? (samples.t_s[pose.first + pose.count - 1] - visit.t_arrival_s) /
                                         static_cast<double>(pose.count - 1)
@@ -143,6 +165,10 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
   }
+  parallel_for(kAxisCount, [&](std::size_t i) { log.line[i] = line_through_dwells(set, i); });
+  for (const Visit& visit : log.visits)
+    if (!log.contrasts.contains(visit.count))
+      log.contrasts.emplace(visit.count, contrasts_of(visit, log.line));
   return log;
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/effects/code_evidence.h"
+#include "estimator/effects/dwell_line.h"
 #include "estimator/kinematics.h"
 #include "estimator/measurement.h"
 
@@ -46,8 +47,14 @@ struct VisitLog {
   PerAxis<double> smallest_step_V{};        ///< smallest difference between two different readings
   PerAxis<double> lowest_V{}, highest_V{};  ///< of all readings
   std::optional<Adc> adc;
-  /// dwell_contrasts() of every number of samples that occurs.
+  PerAxis<std::optional<DwellLine>> line;  ///< that runs through the dwells
+  /// What is looked for within a dwell beside its mean, for every number of samples that occurs:
+  /// samples × dwell_contrasts(), orthonormal columns of zero sum; what a dwell cannot resolve is
+  /// zero. The first are step_contrasts(); then come sine and cosine of every line.
   std::map<std::size_t, Eigen::MatrixXd> contrasts;
+
+  /// How many numbers describe the course of a dwell beside its mean.
+  Eigen::Index dwell_contrasts() const { return contrasts.begin()->second.cols(); }
 
   /// Whether some axis reads with less noise than its converter needs to average rounding away.
   bool is_coarse() const;
@@ -55,13 +62,10 @@ struct VisitLog {
   double last_s() const { return visits.back().t_mean_s; }
 };
 
-/// How many numbers describe the course of a dwell beside its mean.
-inline constexpr Eigen::Index kDwellContrasts = 5;
-
-/// What is looked for within a dwell of `samples` samples: samples × 5, orthonormal columns of zero
-/// sum. They span the steps after 1/32, 1/16 … 1/2 of the dwell, finest where transients after a
-/// move are fastest; columns that a short dwell cannot resolve are zero.
-Eigen::MatrixXd dwell_contrasts(std::size_t samples);
+/// For what changes slowly within a dwell of `samples` samples: samples × 5, orthonormal columns of
+/// zero sum. They span the steps after 1/32, 1/16 … 1/2 of the dwell, finest where transients after
+/// a move are fastest; columns that a short dwell cannot resolve are zero.
+Eigen::MatrixXd step_contrasts(std::size_t samples);
 
 /// Without angles those of the visits are zero. Precondition: every pose has a sample.
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description);

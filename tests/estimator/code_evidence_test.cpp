@@ -1,9 +1,13 @@
-// What the codes show by themselves.
+// What codes and samples show by themselves, before anything is fitted.
 #include "estimator/effects/code_evidence.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
+#include <random>
+
+#include "estimator/effects/dwell_line.h"
 
 namespace plumbline {
 namespace {
@@ -65,6 +69,45 @@ TEST(CodeEvidence, LowestBitsAllClearAreACoarserStep) {
   const auto lattice = coarser_lattice(codes, kSixteenBits);
   ASSERT_TRUE(lattice);
   EXPECT_NEAR(lattice->step_V, 8 * kSixteenBits.lsb_V(), 1e-6);
+}
+
+// 200 dwells of 40 samples at 100 Hz with white noise, every 6.4 s as a raster has them.
+MeasurementSet dwells(std::uint64_t seed, double amplitude_V, double f_hz, double phase_rad) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise_V(0, 3e-4);
+  MeasurementSet set;
+  for (int k = 0; k < 200; ++k) {
+    set.poses.push_back({k, 0, 0, set.samples.size(), 40});
+    for (int m = 0; m < 40; ++m) {
+      const double t_s = 6.4 * k + 0.01 * m;
+      set.samples.t_s.push_back(t_s);
+      for (auto& u_V : set.samples.u_V)
+        u_V.push_back(0.02 * std::sin(0.3 * k) + noise_V(random) +
+                      amplitude_V * std::sin(2 * std::numbers::pi * f_hz * t_s + phase_rad));
+    }
+  }
+  return set;
+}
+
+TEST(DwellLine, IsFoundAtItsFrequencyAmongTheAliasesOfTheRaster) {
+  const auto line = line_through_dwells(dwells(1, 1e-4, 23.371, 1.2), 0);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->f_hz, 23.371, 1e-4);  // the next alias of the raster is 0.156 Hz away
+  EXPECT_NEAR(line->amplitude_V, 1e-4, 2e-5);
+  EXPECT_NEAR(std::remainder(line->phase_rad - 1.2, 2 * std::numbers::pi), 0, 0.3);
+}
+
+TEST(DwellLine, AboveHalfTheSamplingRateIsSeenAtItsAlias) {
+  const auto line = line_through_dwells(dwells(2, 2e-4, 59.9, 0.4), 1);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->f_hz, 40.1, 1e-4);
+}
+
+TEST(DwellLine, NoiseHasNone) {
+  for (std::uint64_t seed = 10; seed < 20; ++seed)
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      EXPECT_FALSE(line_through_dwells(dwells(seed, 0, 0, 0), axis)) << seed;
+  EXPECT_FALSE(line_through_dwells({}, 0));
 }
 
 }  // namespace

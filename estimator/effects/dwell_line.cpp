@@ -1,0 +1,195 @@
+#include "estimator/effects/dwell_line.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <map>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+#include "estimator/effects/visit_log.h"
+
+namespace plumbline {
+namespace {
+
+constexpr double kTurn_rad = 2 * std::numbers::pi;
+constexpr std::size_t kFewestSamples = 8;
+constexpr Eigen::Index kFewestDwells = 10;
+constexpr double kFalseAlarm = 1e-5;
+
+/// All dwells of one axis, side by side.
+struct Dwells {
+  Eigen::ArrayXd t_s;     ///< first sample of each, from the first of all
+  double origin_s = 0;    ///< of those times, on the clock of the run
+  double step_s = 0;      ///< between samples
+  double samples = 0;     ///< of all
+  Eigen::MatrixXd off_V;  ///< samples × dwells, without mean and without what changes slowly
+                          ///< within a dwell; a shorter dwell ends in zeros
+  double run_s() const { return t_s(t_s.size() - 1); }
+};
+
+Dwells dwells_of(const MeasurementSet& set, std::size_t axis) {
+  std::vector<const Pose*> poses;
+  std::size_t longest = 0;
+  for (const Pose& pose : set.poses) {
+    if (pose.count < kFewestSamples) continue;
+    poses.push_back(&pose);
+    longest = std::max(longest, pose.count);
+  }
+  const std::vector<double>& t_s = set.samples.t_s;
+  std::map<std::size_t, Eigen::MatrixXd> slow;
+  Dwells dwells;
+  if (poses.empty()) return dwells;
+  dwells.origin_s = t_s[poses.front()->first];
+  dwells.t_s.resize(std::ssize(poses));
+  dwells.off_V.setZero(static_cast<Eigen::Index>(longest), std::ssize(poses));
+  double steps = 0, spans_s = 0;
+  for (Eigen::Index k = 0; k < dwells.t_s.size(); ++k) {
+    const Pose& pose = *poses[static_cast<std::size_t>(k)];
+    const auto n = static_cast<Eigen::Index>(pose.count);
+    const Eigen::Map<const Eigen::VectorXd> u_V(set.samples.u_V[axis].data() + pose.first, n);
+    const Eigen::MatrixXd& contrasts =
+        slow.try_emplace(pose.count, step_contrasts(pose.count)).first->second;
+    Eigen::VectorXd off_V = u_V.array() - u_V.mean();
+    off_V -= contrasts * (contrasts.transpose() * off_V);
+    dwells.off_V.col(k).head(n) = off_V;
+    dwells.t_s(k) = t_s[pose.first] - dwells.origin_s;
+    spans_s += t_s[pose.first + pose.count - 1] - t_s[pose.first];
+    steps += static_cast<double>(n - 1);
+  }
+  dwells.step_s = spans_s / steps;
+  dwells.samples = steps + static_cast<double>(poses.size());
+  return dwells;
+}
+
+/// exp(−2πi·f·t)
+Eigen::ArrayXcd turning(double f_hz, const Eigen::ArrayXd& t_s) {
+  const Eigen::ArrayXd phase = -kTurn_rad * f_hz * t_s;
+  Eigen::ArrayXcd turned(t_s.size());
+  turned.real() = phase.cos();
+  turned.imag() = phase.sin();
+  return turned;
+}
+
+/// Σ off·exp(−2πi·f·t) over each dwell.
+Eigen::ArrayXcd components(const Dwells& dwells, double f_hz) {
+  const Eigen::ArrayXd within_s =
+      dwells.step_s * Eigen::ArrayXd::LinSpaced(dwells.off_V.rows(), 0,
+                                                static_cast<double>(dwells.off_V.rows() - 1));
+  const Eigen::VectorXcd turned = turning(f_hz, within_s);
+  Eigen::ArrayXcd sums(dwells.t_s.size());
+  sums.real() = (dwells.off_V.transpose() * turned.real()).array();
+  sums.imag() = (dwells.off_V.transpose() * turned.imag()).array();
+  return sums * turning(f_hz, dwells.t_s);
+}
+
+double joint_power(const Dwells& dwells, double f_hz) {
+  return std::norm(components(dwells, f_hz).sum());
+}
+
+/// The frequency within ±width/2 of `f_hz` at which the dwells together have most power; `f_hz`
+/// when nowhere there they agree in phase.
+double best_frequency(const Dwells& dwells, double f_hz, double width_hz,
+                      Eigen::FFT<double>& transform) {
+  // One Fourier transform over the times of the dwells, rounded to slots: an eighth of a turn of
+  // phase at most, at the edge of the band.
+  const double slot_s = 0.25 / width_hz;
+  std::size_t slots = 1;
+  while (static_cast<double>(slots) * slot_s < 2 * dwells.run_s()) slots *= 2;
+  std::vector<std::complex<double>> in_time(slots), spectrum;
+  const Eigen::ArrayXcd parts = components(dwells, f_hz);
+  for (Eigen::Index k = 0; k < parts.size(); ++k)
+    in_time[static_cast<std::size_t>(std::lround(dwells.t_s(k) / slot_s))] += parts(k);
+  transform.fwd(spectrum, in_time);
+  const double bin_hz = 1 / (static_cast<double>(slots) * slot_s);
+  const auto reach = static_cast<std::ptrdiff_t>(0.5 * width_hz / bin_hz);
+  const auto power_at = [&](std::ptrdiff_t bin) {
+    return std::norm(
+        spectrum[static_cast<std::size_t>(bin < 0 ? bin + std::ssize(spectrum) : bin)]);
+  };
+  std::vector<std::ptrdiff_t> peaks;
+  constexpr double kNotNoise = 12;  // times the power that the dwells have apart
+  const double apart_V2 = parts.abs2().sum();
+  for (std::ptrdiff_t bin = -reach; bin <= reach; ++bin)
+    if (power_at(bin) > kNotNoise * apart_V2 && power_at(bin) >= power_at(bin - 1) &&
+        power_at(bin) >= power_at(bin + 1))
+      peaks.push_back(bin);
+  if (peaks.empty()) return f_hz;
+  // Dwells at equal distances in time have many peaks of one height there; only the course within
+  // the dwells tells them apart, so each is climbed.
+  constexpr std::size_t kPeaks = 24;
+  const std::size_t looked_at = std::min(kPeaks, peaks.size());
+  std::partial_sort(peaks.begin(), peaks.begin() + static_cast<std::ptrdiff_t>(looked_at),
+                    peaks.end(),
+                    [&](std::ptrdiff_t a, std::ptrdiff_t b) { return power_at(a) > power_at(b); });
+  peaks.resize(looked_at);
+  double best_hz = f_hz, best_power = joint_power(dwells, f_hz);
+  for (const std::ptrdiff_t peak : peaks) {
+    double at_hz = f_hz + bin_hz * static_cast<double>(peak), power = joint_power(dwells, at_hz);
+    for (double step_hz = 0.5 * bin_hz; step_hz > 1e-2 * bin_hz; step_hz /= 2) {
+      const double centre_hz = at_hz;
+      for (const double trial_hz : {centre_hz - step_hz, centre_hz + step_hz}) {
+        const double trial = joint_power(dwells, trial_hz);
+        if (trial <= power) continue;
+        power = trial;
+        at_hz = trial_hz;
+      }
+    }
+    if (power <= best_power) continue;
+    best_power = power;
+    best_hz = at_hz;
+  }
+  return best_hz;
+}
+
+}  // namespace
+
+std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::size_t axis) {
+  constexpr std::size_t kStrongest = 3;
+  const Dwells dwells = dwells_of(set, axis);
+  if (dwells.t_s.size() < kFewestDwells || !(dwells.step_s > 0)) return {};
+  const auto longest = static_cast<std::size_t>(dwells.off_V.rows());
+  const double dwell_s = dwells.step_s * static_cast<double>(longest);
+  const double width_hz = 0.5 / dwell_s, nyquist_hz = 0.5 / dwells.step_s;
+
+  // Power at each frequency over that of white noise there, which the removal of what is slow
+  // lowers towards the lower end.
+  struct Band {
+    double f_hz = 0;
+    double power = 0;
+  };
+  std::vector<Band> bands;
+  Dwells slow;
+  slow.off_V = step_contrasts(longest);
+  slow.t_s.setZero(slow.off_V.cols());
+  slow.step_s = dwells.step_s;
+  for (double f_hz = 1.5 / dwell_s; f_hz < nyquist_hz * (1 + 1e-9); f_hz += width_hz) {
+    const double share = static_cast<double>(longest) - components(slow, f_hz).abs2().sum();
+    bands.push_back({f_hz, components(dwells, f_hz).abs2().sum() / share});
+  }
+  const std::size_t looked_at = std::min(kStrongest, bands.size());
+  std::partial_sort(bands.begin(), bands.begin() + static_cast<std::ptrdiff_t>(looked_at),
+                    bands.end(), [](const Band& a, const Band& b) { return a.power > b.power; });
+
+  Eigen::FFT<double> transform;
+  double best_hz = 0, best_power = 0;
+  for (std::size_t k = 0; k < looked_at; ++k) {
+    const double f_hz = best_frequency(dwells, bands[k].f_hz, width_hz, transform);
+    const double power = joint_power(dwells, f_hz);
+    if (power <= best_power) continue;
+    best_power = power;
+    best_hz = f_hz;
+  }
+  const double apart_V2 = components(dwells, best_hz).abs2().sum();
+  const double looks = static_cast<double>(looked_at) * width_hz * dwells.run_s();
+  if (!(apart_V2 > 0) || looks * std::exp(-best_power / apart_V2) > kFalseAlarm) return {};
+  // What lies beyond half the sampling rate is its own mirror image.
+  if (best_hz > nyquist_hz) best_hz = 2 * nyquist_hz - best_hz;
+  const std::complex<double> sum = components(dwells, best_hz).sum();
+  const double phase = std::arg(sum) + 0.25 * kTurn_rad - kTurn_rad * best_hz * dwells.origin_s;
+  return DwellLine{best_hz, 2 * std::abs(sum) / dwells.samples,
+                   phase - kTurn_rad * std::floor(phase / kTurn_rad)};
+}
+
+}  // namespace plumbline
