@@ -26,6 +26,7 @@ struct Dwells {
   double samples = 0;     ///< of all
   Eigen::MatrixXd off_V;  ///< samples × dwells, without mean and without what changes slowly
                           ///< within a dwell; a shorter dwell ends in zeros
+  Eigen::MatrixXd slow;   ///< step_contrasts() of the longest
   double run_s() const { return t_s(t_s.size() - 1); }
 };
 
@@ -43,6 +44,7 @@ Dwells dwells_of(const MeasurementSet& set, std::size_t axis) {
   if (poses.empty()) return dwells;
   dwells.origin_s = t_s[poses.front()->first];
   dwells.t_s.resize(std::ssize(poses));
+  dwells.slow = step_contrasts(longest);
   dwells.off_V.setZero(static_cast<Eigen::Index>(longest), std::ssize(poses));
   double steps = 0, spans_s = 0;
   for (Eigen::Index k = 0; k < dwells.t_s.size(); ++k) {
@@ -84,8 +86,20 @@ Eigen::ArrayXcd components(const Dwells& dwells, double f_hz) {
   return sums * turning(f_hz, dwells.t_s);
 }
 
+/// Share of a sine of this frequency that is left when what is slow within a dwell is removed.
+double share_left(const Dwells& dwells, double f_hz) {
+  const Eigen::Index n = dwells.off_V.rows();
+  Dwells removed;
+  removed.step_s = dwells.step_s;
+  removed.off_V.resize(n, dwells.slow.cols() + 1);
+  removed.off_V << dwells.slow, Eigen::VectorXd::Constant(n, 1 / std::sqrt(static_cast<double>(n)));
+  removed.t_s.setZero(removed.off_V.cols());
+  return 1 - components(removed, f_hz).abs2().sum() / static_cast<double>(n);
+}
+
+/// Power of the dwells together at a frequency, as large as if nothing had been removed.
 double joint_power(const Dwells& dwells, double f_hz) {
-  return std::norm(components(dwells, f_hz).sum());
+  return std::norm(components(dwells, f_hz).sum()) / share_left(dwells, f_hz);
 }
 
 /// The frequency within ±width/2 of `f_hz` at which the dwells together have most power; `f_hz`
@@ -160,14 +174,8 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
     double power = 0;
   };
   std::vector<Band> bands;
-  Dwells slow;
-  slow.off_V = step_contrasts(longest);
-  slow.t_s.setZero(slow.off_V.cols());
-  slow.step_s = dwells.step_s;
-  for (double f_hz = 1.5 / dwell_s; f_hz < nyquist_hz * (1 + 1e-9); f_hz += width_hz) {
-    const double share = static_cast<double>(longest) - components(slow, f_hz).abs2().sum();
-    bands.push_back({f_hz, components(dwells, f_hz).abs2().sum() / share});
-  }
+  for (double f_hz = 1.5 / dwell_s; f_hz < nyquist_hz * (1 + 1e-9); f_hz += width_hz)
+    bands.push_back({f_hz, components(dwells, f_hz).abs2().sum() / share_left(dwells, f_hz)});
   const std::size_t looked_at = std::min(kStrongest, bands.size());
   std::partial_sort(bands.begin(), bands.begin() + static_cast<std::ptrdiff_t>(looked_at),
                     bands.end(), [](const Band& a, const Band& b) { return a.power > b.power; });
@@ -181,14 +189,14 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
     best_power = power;
     best_hz = f_hz;
   }
-  const double apart_V2 = components(dwells, best_hz).abs2().sum();
+  const double apart_V2 = components(dwells, best_hz).abs2().sum() / share_left(dwells, best_hz);
   const double looks = static_cast<double>(looked_at) * width_hz * dwells.run_s();
   if (!(apart_V2 > 0) || looks * std::exp(-best_power / apart_V2) > kFalseAlarm) return {};
   // What lies beyond half the sampling rate is its own mirror image.
   if (best_hz > nyquist_hz) best_hz = 2 * nyquist_hz - best_hz;
   const std::complex<double> sum = components(dwells, best_hz).sum();
   const double phase = std::arg(sum) + 0.25 * kTurn_rad - kTurn_rad * best_hz * dwells.origin_s;
-  return DwellLine{best_hz, 2 * std::abs(sum) / dwells.samples,
+  return DwellLine{best_hz, 2 * std::abs(sum) / (share_left(dwells, best_hz) * dwells.samples),
                    phase - kTurn_rad * std::floor(phase / kTurn_rad)};
 }
 

@@ -90,10 +90,10 @@ MeasurementSet dwells(std::uint64_t seed, double amplitude_V, double f_hz, doubl
 }
 
 TEST(DwellLine, IsFoundAtItsFrequencyAmongTheAliasesOfTheRaster) {
-  const auto line = line_through_dwells(dwells(1, 3e-4, 23.371, 1.2), 0);
+  const auto line = line_through_dwells(dwells(1, 6e-4, 23.371, 1.2), 0);
   ASSERT_TRUE(line);
   EXPECT_NEAR(line->f_hz, 23.371, 1e-4);  // the next alias of the raster is 0.156 Hz away
-  EXPECT_NEAR(line->amplitude_V, 3e-4, 2e-5);
+  EXPECT_NEAR(line->amplitude_V, 6e-4, 2e-5);
   EXPECT_NEAR(std::remainder(line->phase_rad - 1.2, 2 * std::numbers::pi), 0, 0.1);
 }
 
