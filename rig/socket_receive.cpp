@@ -82,7 +82,8 @@ Received receive_frame(int socket, std::chrono::milliseconds timeout) {
   return received;
 }
 
-std::uint64_t set_receive_buffer(int socket, int wanted) {
+std::uint64_t set_receive_buffer(int socket) {
+  const int wanted = 4 << 20;
   setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof wanted);
   int granted = 0;
   socklen_t size = sizeof granted;

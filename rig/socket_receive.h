@@ -49,7 +49,7 @@ struct Received {
 /// Takes what is there at once, or waits up to `timeout`. `socket` is non-blocking.
 Received receive_frame(int socket, std::chrono::milliseconds timeout);
 
-/// Asks for a receive buffer of `wanted` bytes and returns what the kernel granted.
-std::uint64_t set_receive_buffer(int socket, int wanted);
+/// Asks for a receive buffer of 4 MB and returns what the kernel granted.
+std::uint64_t set_receive_buffer(int socket);
 
 }  // namespace plumbline::rig

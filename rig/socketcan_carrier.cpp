@@ -12,12 +12,6 @@
 
 namespace plumbline::rig {
 
-namespace {
-
-constexpr int kReceiveBuffer_bytes = 4 << 20;
-
-}  // namespace
-
 SocketCanCarrier::SocketCanCarrier(std::string interface)
     : interface_(std::move(interface)), address_("can:" + interface_) {}
 
@@ -47,7 +41,7 @@ Result<void> SocketCanCarrier::open() {
   }
   // Interfaces without CAN FD refuse this; classic frames come all the same.
   setsockopt(socket.get(), SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &on, sizeof on);
-  receive_buffer_bytes_ = set_receive_buffer(socket.get(), kReceiveBuffer_bytes);
+  receive_buffer_bytes_ = set_receive_buffer(socket.get());
 
   sockaddr_can address{};
   address.can_family = AF_CAN;

@@ -12,7 +12,6 @@ namespace plumbline::rig {
 
 namespace {
 
-constexpr int kReceiveBuffer_bytes = 4 << 20;
 constexpr std::chrono::milliseconds kConnectTimeout{2000};
 constexpr std::chrono::milliseconds kConnectPause{10};
 
@@ -44,7 +43,7 @@ Result<void> UnixCarrier::open() {
     }
     std::this_thread::sleep_for(kConnectPause);
   }
-  receive_buffer_bytes_ = set_receive_buffer(socket.get(), kReceiveBuffer_bytes);
+  receive_buffer_bytes_ = set_receive_buffer(socket.get());
   socket_ = std::move(socket);
   return {};
 }

@@ -12,8 +12,6 @@
 namespace plumbline::app {
 namespace {
 
-constexpr double kWidth = 700;
-
 struct Rgb {
   double r, g, b;
 };
@@ -102,7 +100,7 @@ Figure residual_map(const FigureContext& context, const Grid& grid) {
   }
   figure.description =
       context.tr("Maps of the residual over spindle angle and tilt for the axes x, y and z");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   const double cell_delta = span_or(grid.delta.step_deg, 10), cell_h = span_or(grid.h.step_deg, 10);
   constexpr double kMapHeight = 136, kGap = 26, kTop = 22;
   figure.height = kTop + 3 * (kMapHeight + kGap) + 68;
@@ -118,7 +116,7 @@ Figure residual_map(const FigureContext& context, const Grid& grid) {
     if (calibration.pose_results.empty()) return;
     const double scale = nice_ceiling(largest_residual(calibration, both));
     const int columns = both ? 2 : 1;
-    const double width = (kWidth - 58 - 12 - (columns - 1) * 26) / columns;
+    const double width = (kFigureWidth - 58 - 12 - (columns - 1) * 26) / columns;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const double top = kTop + static_cast<double>(i) * (kMapHeight + kGap);
       for (int column = 0; column < columns; ++column) {
@@ -156,7 +154,7 @@ Figure residual_histogram(const FigureContext& context) {
       "Residuals of the poses in units of what the identified noise alone would leave (bars), and "
       "the normal distribution that they should follow (line).");
   figure.description = context.tr("Histograms of the normalised residuals for the axes x, y and z");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   figure.height = 230;
   figure.draw = [context](Canvas& canvas) {
     const Calibration& calibration = *context.calibration;
@@ -208,7 +206,7 @@ Figure residual_course(const FigureContext& context) {
                 "Residual of every pose against the time of the run and against temperature.")
           : context.tr("Residual of every pose against the time of the run.");
   figure.description = context.tr("Residuals against time and temperature");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   constexpr double kPanelHeight = 84, kStepY = 106, kTop = 24;
   figure.height = kTop + 3 * kStepY + 30;
   figure.draw = [context, with_temperature](Canvas& canvas) {
@@ -230,7 +228,7 @@ Figure residual_course(const FigureContext& context) {
       const double margin = std::max(0.03 * (high - low), 1e-3 * std::max(1.0, std::abs(high)));
       return std::pair(low - margin, high + margin);
     };
-    const double width = with_temperature ? 380 : kWidth - 76;
+    const double width = with_temperature ? 380 : kFigureWidth - 76;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       std::vector<double> residual;
       for (const PoseResult& p : calibration.pose_results) {
@@ -251,7 +249,7 @@ Figure residual_course(const FigureContext& context) {
       temperature.tick_labels = i == 2;
       y.label.clear();
       y.tick_labels = false;
-      Plot other(canvas, {60 + width + 24, top}, kWidth - 60 - width - 24 - 16, kPanelHeight,
+      Plot other(canvas, {60 + width + 24, top}, kFigureWidth - 60 - width - 24 - 16, kPanelHeight,
                  temperature, y);
       other.draw_frame();
       other.points(temp_C, residual, 1.6, kAxisColor[i]);

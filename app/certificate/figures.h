@@ -9,6 +9,8 @@
 
 namespace plumbline::app {
 
+inline constexpr double kFigureWidth = 700;  ///< px
+
 struct FigureContext {
   std::shared_ptr<const Calibration> calibration;  ///< never null
   Translator tr;

@@ -16,8 +16,6 @@
 namespace plumbline::app {
 namespace {
 
-constexpr double kWidth = 700;
-
 /// From dark to light, so that the parts of a bar stay apart without colour.
 constexpr std::array kPartColors = {"#08519c", "#d55e00", "#e8b35a", "#d9d9d9"};
 
@@ -29,7 +27,7 @@ Figure allan_figure(const FigureContext& context) {
       "Overlapping Allan deviation of each output, input-referred (points, with 95 % limits), and "
       "the sum of the identified noise terms (lines).");
   figure.description = context.tr("Allan deviation against averaging time for the axes x, y and z");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   figure.height = 330;
   figure.draw = [context](Canvas& canvas) {
     const Calibration& calibration = *context.calibration;
@@ -48,13 +46,13 @@ Figure allan_figure(const FigureContext& context) {
       }
     }
     if (series.empty()) {
-      canvas.text({kWidth / 2, 160},
+      canvas.text({kFigureWidth / 2, 160},
                   context.tr("no static record long enough for an Allan deviation"),
                   {12, Anchor::middle});
       return;
     }
     draw_allan(
-        canvas, {0, 0}, kWidth, 325, series,
+        canvas, {0, 0}, kFigureWidth, 325, series,
         {context.tr("averaging time τ, s"), context.tr("overlapping Allan deviation, {}", "m/s²")});
   };
   return figure;
@@ -67,7 +65,7 @@ Figure convergence_figure(const FigureContext& context) {
       "least-squares value; the grey band is the final standard uncertainty times two.");
   figure.description =
       context.tr("Convergence of recursive least squares, filter and batch least squares");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   constexpr double kPanelWidth = 112, kPanelHeight = 92, kStepX = 164, kStepY = 136, kTop = 50;
   figure.height = kTop + 3 * kStepY - 4;
   figure.draw = [context](Canvas& canvas) {
@@ -137,7 +135,7 @@ Figure budget_figure(const FigureContext& context, const RunDescription& descrip
       "What the variance of each scale factor K_ii and offset U_i0 is made of, in shares; on the "
       "right the expanded uncertainty.");
   figure.description = context.tr("Bars of the uncertainty budget");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   figure.height = kTop + 6 * kStep + 34;
   std::vector<Budget> budgets;
   for (const bool offset : {false, true}) {
@@ -147,7 +145,7 @@ Figure budget_figure(const FigureContext& context, const RunDescription& descrip
     }
   }
   figure.draw = [context, budgets](Canvas& canvas) {
-    const double width = kWidth - kLeft - 130;
+    const double width = kFigureWidth - kLeft - 130;
     const std::array<std::string, kPartColors.size()> names = {
         context.tr("readings"), context.tr("angle δ"), context.tr("angle h"),
         context.tr("local gravity")};
@@ -229,7 +227,7 @@ Figure evidence_figure(const FigureContext& context) {
       "Evidence for the added effects: the share of the excess error on left-out poses that each "
       "removes, and the probability of as much by noise alone.");
   figure.description = context.tr("Bars of the evidence for each effect");
-  figure.width = kWidth;
+  figure.width = kFigureWidth;
   figure.height = kTop + static_cast<double>(list.size()) * kStep + 22;
   figure.draw = [context, list](Canvas& canvas) {
     double y = kTop;

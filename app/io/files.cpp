@@ -19,11 +19,6 @@ namespace {
 
 std::string reason_of(int error_number) { return std::generic_category().message(error_number); }
 
-tl::unexpected<Error> cannot_write(const fs::path& path, int error_number) {
-  return fail(ErrorCode::output,
-              fmt::format("{}: cannot write: {}", path.string(), reason_of(error_number)));
-}
-
 /// An errno value, 0 for success.
 int write_all(int file, std::string_view content) {
   while (!content.empty()) {
@@ -54,6 +49,11 @@ void sync_folder(const fs::path& folder) {
 }
 
 }  // namespace
+
+tl::unexpected<Error> cannot_write(const fs::path& path, int error_number) {
+  return fail(ErrorCode::output,
+              fmt::format("{}: cannot write: {}", path.string(), reason_of(error_number)));
+}
 
 Result<std::string> read_text(const fs::path& path) {
   const auto refuse = [&](const std::string& reason) {

@@ -14,15 +14,6 @@ namespace plumbline::app {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-tl::unexpected<Error> cannot_write(const fs::path& path, int error_number) {
-  return fail(ErrorCode::output, fmt::format("{}: cannot write: {}", path.string(),
-                                             std::generic_category().message(error_number)));
-}
-
-}  // namespace
-
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : folder_(std::move(other.folder_)),
       staging_(std::exchange(other.staging_, {})),

@@ -33,7 +33,7 @@ constexpr std::size_t kLongestRequest = 4096;
 constexpr std::size_t kMostUnsent = 1 << 20;
 constexpr std::size_t kMostPoses = 1000;
 /// Bounds how late the end of the session and a change of state are noticed.
-constexpr milliseconds kTurn{50};
+constexpr milliseconds kPollTurn{50};
 
 /// sun_path has 108 bytes. A longer path is gone to by its folder, held open.
 struct Address {
@@ -210,7 +210,7 @@ void ControlSocket::Server::run(const std::stop_token& stop) {
       const auto events = static_cast<short>(client.out.empty() ? POLLIN : POLLIN | POLLOUT);
       ready.push_back({client.socket.get(), events, 0});
     }
-    ::poll(ready.data(), ready.size(), static_cast<int>(kTurn.count()));
+    ::poll(ready.data(), ready.size(), static_cast<int>(kPollTurn.count()));
     for (std::size_t i = 0; i < clients.size(); ++i) {
       if (ready[i + 1].revents != 0) read_from(clients[i]);
       feed_watcher(clients[i]);

@@ -19,12 +19,6 @@ namespace {
 constexpr const char* kCookie = "plumbline_token";
 constexpr std::size_t kShortestToken = 16;
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
 /// The value of our cookie in a Cookie header.
 std::string cookie_in(const std::string& header) {
   std::istringstream parts(header);

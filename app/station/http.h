@@ -75,4 +75,11 @@ class HttpServer {
   std::unique_ptr<Library> library_;
 };
 
+/// Without blanks, tabs and carriage returns at both ends.
+inline std::string trimmed(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r");
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+}
+
 }  // namespace plumbline::app

@@ -12,6 +12,7 @@
 
 #include "app/io/read_file.h"
 #include "app/provenance.h"
+#include "app/station/http.h"
 
 extern char** environ;
 
@@ -27,12 +28,6 @@ constexpr std::size_t kLongestName = 80;
 bool has_control_character(const std::string& text) {
   return std::any_of(text.begin(), text.end(),
                      [](unsigned char c) { return c < 0x20 || c == 0x7f; });
-}
-
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(' ');
-  return begin == std::string::npos ? ""
-                                    : text.substr(begin, text.find_last_not_of(' ') - begin + 1);
 }
 
 Result<std::string> text_field(const Json& json, const char* key, std::size_t longest) {

@@ -14,7 +14,7 @@ constexpr std::size_t kLanes = 8;
 using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
 
 // 64 kB of record: with its two shifted views it fits into a second-level cache.
-constexpr std::size_t kBlock = 8192;
+constexpr std::size_t kDifferencesPerBlock = 8192;
 
 /// Always inlined into functions for one kind of processor each. Two accumulators hide the latency
 /// of the additions.
@@ -70,14 +70,14 @@ BlockSum choose_block_sum() { return block_sum_plain; }
 std::vector<double> second_difference_sums(const std::vector<double>& x,
                                            const std::vector<std::size_t>& lags, bool all_cores) {
   const BlockSum sum_of = choose_block_sum();
-  const std::size_t blocks = x.size() / kBlock + 1;
+  const std::size_t blocks = x.size() / kDifferencesPerBlock + 1;
   std::vector<double> partial(blocks * lags.size(), 0.0);
   const auto work = [&](std::size_t block) {
-    const std::size_t begin = block * kBlock;
+    const std::size_t begin = block * kDifferencesPerBlock;
     for (std::size_t j = 0; j < lags.size(); ++j) {
       const std::size_t m = lags[j];
       if (x.size() <= 2 * m || begin >= x.size() - 2 * m) continue;
-      const std::size_t count = std::min(kBlock, x.size() - 2 * m - begin);
+      const std::size_t count = std::min(kDifferencesPerBlock, x.size() - 2 * m - begin);
       const double* a = x.data() + begin;
       partial[block * lags.size() + j] = sum_of(a, a + m, a + 2 * m, count);
     }

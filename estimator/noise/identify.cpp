@@ -10,7 +10,9 @@
 #include "estimator/noise/allan.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/noise/line_search.h"
+#include "estimator/noise/misfit.h"
 #include "estimator/noise/record_terms.h"
+#include "estimator/noise/term_choice.h"
 #include "estimator/noise/term_fit.h"
 
 namespace plumbline {
@@ -19,10 +21,6 @@ namespace {
 
 constexpr std::size_t kFewestSamples = 64;
 constexpr std::size_t kFewestChanges = 32;
-// A variance at the edge of its range: ½χ²₀ + ½χ²₁ (Self & Liang, 1987), here at 2.5 %.
-constexpr double kVarianceGain = 3.84;
-constexpr double kRampGain = 6.63;  // χ²₁ at 1 %: the slope's variance is itself an estimate
-constexpr double kInadequate = 1e-3;
 // Q, N, B, K; the ramp is a trend.
 constexpr Eigen::Index kVarianceTerms = kTermR;
 

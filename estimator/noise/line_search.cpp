@@ -20,7 +20,7 @@ constexpr double kFalseAlarm = 1e-3;
 constexpr std::size_t kFewestPeriods = 8;
 constexpr int kPasses = 8;
 constexpr std::size_t kMostLines = 40;
-constexpr std::size_t kBlock = 64;  // ordinates whose median is a level
+constexpr std::size_t kOrdinatesPerLevel = 64;  // ordinates whose median is a level
 constexpr double kPi = std::numbers::pi;
 
 /// One sine in the record: a·cos + b·sin of 2πf·i/rate, i the sample.
@@ -40,7 +40,7 @@ struct Level {
 };
 
 double blocks_of(std::size_t ordinates) {
-  return std::floor(static_cast<double>(ordinates) / static_cast<double>(kBlock));
+  return std::floor(static_cast<double>(ordinates) / static_cast<double>(kOrdinatesPerLevel));
 }
 
 /// Smooth density (two-sided, times the rate) at all ordinates k·rate/n of a periodogram of length
@@ -75,11 +75,11 @@ Level measure_level(const std::vector<double>& ratio) {
   Level level;
   const auto blocks =
       static_cast<std::size_t>(std::max(1.0, blocks_of(ratio.size() - kFewestPeriods)));
-  const auto begin_of = [&](std::size_t b) { return kFewestPeriods + b * kBlock; };
+  const auto begin_of = [&](std::size_t b) { return kFewestPeriods + b * kOrdinatesPerLevel; };
   std::vector<double> window;
   for (std::size_t b = 0; b < blocks; ++b) {
     // Three blocks where the spectrum cannot change much within them.
-    const bool wide = begin_of(b) > 16 * kBlock && b + 1 < blocks;
+    const bool wide = begin_of(b) > 16 * kOrdinatesPerLevel && b + 1 < blocks;
     const std::size_t from = begin_of(wide ? b - 1 : b);
     const std::size_t to = b + 1 >= blocks ? ratio.size() - 1 : begin_of(wide ? b + 2 : b + 1);
     window.assign(ratio.begin() + static_cast<std::ptrdiff_t>(from),
@@ -108,12 +108,13 @@ std::vector<Peak> find_peaks(const std::vector<Complex>& X, std::size_t n,
   const double scale = 1 / static_cast<double>(n);
   for (std::size_t k = 0; k < half; ++k) ratio[k] = std::norm(X[k]) * scale / smooth[k];
   std::vector<Peak> peaks;
-  if (half < kFewestPeriods + kBlock / 2) return peaks;
+  if (half < kFewestPeriods + kOrdinatesPerLevel / 2) return peaks;
   const Level level = measure_level(ratio);
   // Half-way points are not new ordinates, but nearly.
   const double trials = 2 * static_cast<double>(half);
   for (std::size_t k = kFewestPeriods; k + 1 < half; ++k) {
-    const std::size_t block = std::min((k - kFewestPeriods) / kBlock, level.value.size() - 1);
+    const std::size_t block =
+        std::min((k - kFewestPeriods) / kOrdinatesPerLevel, level.value.size() - 1);
     const double here = level.value[block];
     const double m = level.m[block];
     // A pure sine half-way between two ordinates stands in both with opposite sign.

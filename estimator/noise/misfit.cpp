@@ -5,6 +5,7 @@
 
 #include "estimator/noise/chi_squared.h"
 #include "estimator/noise/spectrum_fit.h"
+#include "estimator/noise/square.h"
 
 namespace plumbline {
 
@@ -13,10 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kInadequate = 1e-3;
-
-double square(double x) { return x * x; }
 
 /// Normal deviate of a sum of squares that has `count` degrees of freedom (Wilson & Hilferty).
 double deviate(double sum, double count) {

@@ -9,6 +9,9 @@
 
 namespace plumbline {
 
+/// A description whose deviations are less likely than this is called inadequate.
+inline constexpr double kInadequate = 1e-3;
+
 /// Deviations of the spectrum from a description.
 struct Misfit {
   double chi2 = 0;  ///< one value a bin of at least 8 coefficients

@@ -10,6 +10,7 @@
 #include "estimator/noise/misfit.h"
 #include "estimator/noise/spectrum_fit.h"
 #include "estimator/noise/spectrum_sums.h"
+#include "estimator/noise/square.h"
 #include "estimator/noise/term_choice.h"
 
 namespace plumbline {
@@ -21,13 +22,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr Index kVariances = 4;  // Q N B K
-constexpr double kVarianceGain = 3.84;
-constexpr double kRampGain = 6.63;  // χ²₁ at 1 %: the slope's variance is itself an estimate
+constexpr Index kVariances = 4;         // Q N B K
 constexpr double kTwoSided95 = 3.8415;  // χ²₁
 constexpr double kOneSided95 = 2.7055;
-
-double square(double x) { return x * x; }
 
 /// Covariance of the powers, then of the logarithms of the shape's parameters, those at zero left
 /// out (zero rows): as the likelihood has it, and as the scatter of whole octaves about the

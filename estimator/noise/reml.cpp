@@ -8,6 +8,7 @@
 
 #include "estimator/linear_algebra.h"
 #include "estimator/noise/nonnegative.h"
+#include "estimator/noise/square.h"
 
 namespace plumbline {
 
@@ -18,8 +19,6 @@ constexpr double kMarkovRatio = 4;  // of neighbouring correlation times
 double duration_s(const SampleWindow& window) {
   return window.step_s * static_cast<double>(window.count);
 }
-
-double square(double value) { return value * value; }
 
 /// The same process with its course over the run counted from its mean, and the variance of that
 /// mean added to all entries alike. Differences between windows are what they were, and so is all

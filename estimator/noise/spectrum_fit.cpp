@@ -13,11 +13,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-struct Slope {
-  double value = 0;
-  double variance = 0;
-};
-
 Slope fit_slope(const SpectrumSums& sums, const VectorXd& variance) {
   double cross = 0;
   double ramp = 0;

@@ -9,6 +9,12 @@
 
 namespace plumbline {
 
+/// Of the ramp in a record, U/s.
+struct Slope {
+  double value = 0;
+  double variance = 0;
+};
+
 /// Coefficients first … first + width − 1 of a cosine spectrum (spectrum.h) taken together.
 struct SpectrumSum {
   std::size_t first = 0;

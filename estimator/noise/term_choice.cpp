@@ -14,8 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 // What 2·ln L must gain. The correlation time of a Gauss-Markov process is searched over decades.
 constexpr double kMarkovGain = 9;
 constexpr double kLowLimitGain = 4;

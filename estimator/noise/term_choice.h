@@ -9,6 +9,12 @@
 
 namespace plumbline {
 
+/// What −2·ln L must fall by for a term to be called present: a variance at the edge of its range
+/// is ½χ²₀ + ½χ²₁ (Self & Liang, 1987), here at 2.5 %; the ramp χ²₁ at 1 %, since its variance is
+/// itself an estimate.
+inline constexpr double kVarianceGain = 3.84;
+inline constexpr double kRampGain = 6.63;
+
 /// A choice of terms and its fit.
 struct TermDescription {
   SpectrumShape shape;

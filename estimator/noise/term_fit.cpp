@@ -36,11 +36,6 @@ std::vector<Bin> make_bins(const SpectrumSums& sums, double decay_per_s) {
   return bins;
 }
 
-struct Slope {
-  double value = 0;
-  double variance = 0;
-};
-
 Slope fit_slope(const std::vector<Bin>& bins, const Vector4& power) {
   double cross = 0;
   double ramp = 0;

@@ -11,9 +11,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr int kDelta = 0x000;
-constexpr int kTilt = 0x100;
-
 /// A drive with a hand on its registers. Time is what the test says.
 class WireDrive : public ::testing::Test {
  protected:

@@ -11,9 +11,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-constexpr int kDelta = 0x000;
-constexpr int kTilt = 0x100;
-
 class WireModbus : public ::testing::TestWithParam<const char*> {
  protected:
   std::string serve(WireRig& rig) {

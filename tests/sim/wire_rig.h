@@ -26,6 +26,10 @@
 
 namespace plumbline::sim {
 
+/// Where the registers of each axis start.
+inline constexpr int kDelta = 0x000;
+inline constexpr int kTilt = 0x100;
+
 /// Polls until `condition` holds; false when it does not within `seconds`.
 inline bool eventually(const std::function<bool()>& condition, double seconds = 20) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);

@@ -51,7 +51,7 @@ std::unique_ptr<Effect> mains_pickup(const EffectContext& p) {
   });
 }
 
-const EffectInfo kEffects[] = {
+const EffectInfo kElectronicsEffects[] = {
     {"adc.quantization",
      "rounding to multiples of lsb from mid-span",
      "code_i",
@@ -67,9 +67,7 @@ const EffectInfo kEffects[] = {
      true,
      {{.name = "bit", .unit = "1", .min = 0, .max = 23},
       {.name = "value", .unit = "1", .min = 0, .max = 1}},
-     [](const EffectContext& p) -> std::unique_ptr<Effect> {
-       return std::make_unique<StuckBit>(p);
-     }},
+     make<StuckBit>},
     {"adc.mains_pickup",
      "amplitude*sin(2*pi*f*t + phase)",
      "t_s",
@@ -81,6 +79,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> electronics_effects() { return kEffects; }
+std::span<const EffectInfo> electronics_effects() { return kElectronicsEffects; }
 
 }  // namespace plumbline::sim

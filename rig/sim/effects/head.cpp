@@ -71,7 +71,7 @@ std::unique_ptr<Effect> pose_outlier(const EffectContext& p) {
   });
 }
 
-const EffectInfo kEffects[] = {
+const EffectInfo kHeadEffects[] = {
     {"rig.base_roll",
      "base turned about x_b by epsilon",
      "delta_deg",
@@ -147,6 +147,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> head_effects() { return kEffects; }
+std::span<const EffectInfo> head_effects() { return kHeadEffects; }
 
 }  // namespace plumbline::sim

@@ -80,7 +80,7 @@ std::unique_ptr<Effect> dielectric_absorption(const EffectContext& p) {
   });
 }
 
-const EffectInfo kEffects[] = {
+const EffectInfo kOwnElectronicsEffects[] = {
     {"own.ratiometric",
      "-c*(supply/nominal - 1)*a_i",
      "supply_V",
@@ -115,9 +115,7 @@ const EffectInfo kEffects[] = {
      "bias",
      true,
      {{"b", "g"}, {.name = "mean", .unit = "s", .min = 0.1}},
-     [](const EffectContext& p) -> std::unique_ptr<Effect> {
-       return std::make_unique<Popcorn>(p);
-     }},
+     make<Popcorn>},
     {"own.dielectric_absorption",
      "c*(a_i at the previous pose - a_i)/(1+(t-t_arrival)/tau)",
      "t_in_pose",
@@ -129,6 +127,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> own_electronics_effects() { return kEffects; }
+std::span<const EffectInfo> own_electronics_effects() { return kOwnElectronicsEffects; }
 
 }  // namespace plumbline::sim

@@ -98,12 +98,7 @@ class ArmVibration final : public Effect {
   double k_;
 };
 
-template <class T>
-std::unique_ptr<Effect> make(const EffectContext& p) {
-  return std::make_unique<T>(p);
-}
-
-const EffectInfo kEffects[] = {
+const EffectInfo kOwnHeadEffects[] = {
     {"own.cable_pull",
      "h += c*(delta-180)/180",
      "delta_deg",
@@ -157,6 +152,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> own_head_effects() { return kEffects; }
+std::span<const EffectInfo> own_head_effects() { return kOwnHeadEffects; }
 
 }  // namespace plumbline::sim

@@ -97,14 +97,9 @@ class Fan final : public Effect {
   double phase_ = 0;
 };
 
-template <class T>
-std::unique_ptr<Effect> make(const EffectContext& p) {
-  return std::make_unique<T>(p);
-}
-
 const ParameterInfo kPeriod{.name = "period", .unit = "s", .min = 1e-3};
 
-const EffectInfo kEffects[] = {
+const EffectInfo kOwnRoomEffects[] = {
     {"own.floor_tilt",
      "base roll += c*sin(2*pi*t/period + phase)",
      "t_s",
@@ -153,6 +148,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> own_room_effects() { return kEffects; }
+std::span<const EffectInfo> own_room_effects() { return kOwnRoomEffects; }
 
 }  // namespace plumbline::sim

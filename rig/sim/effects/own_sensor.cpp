@@ -103,14 +103,7 @@ std::unique_ptr<Effect> chimney(const EffectContext& p) {
   });
 }
 
-const ParameterInfo kTau{.name = "tau", .unit = "s", .min = 1e-6};
-
-template <class T>
-std::unique_ptr<Effect> make(const EffectContext& p) {
-  return std::make_unique<T>(p);
-}
-
-const EffectInfo kEffects[] = {
+const EffectInfo kOwnSensorEffects[] = {
     {"own.thermal_hysteresis",
      "b*(play(T) - T), play of the given width",
      "temp_C",
@@ -157,6 +150,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> own_sensor_effects() { return kEffects; }
+std::span<const EffectInfo> own_sensor_effects() { return kOwnSensorEffects; }
 
 }  // namespace plumbline::sim

@@ -33,7 +33,7 @@ std::unique_ptr<Effect> follow_motor(const EffectContext& p) {
   return follow(p, &Moment::motor_A, p.world.room.hold_A + p.world.room.lift_A / 2);
 }
 
-const EffectInfo kEffects[] = {
+const EffectInfo kRoomEffects[] = {
     {"env.base_field",
      "m1*e1_i + m2*e2_i, e1 = x_b and e2 = y_b seen by the sensor",
      "delta_deg",
@@ -73,6 +73,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> room_effects() { return kEffects; }
+std::span<const EffectInfo> room_effects() { return kRoomEffects; }
 
 }  // namespace plumbline::sim

@@ -103,9 +103,7 @@ std::unique_ptr<Effect> saturation(const EffectContext& p) {
   });
 }
 
-const ParameterInfo kTau{.name = "tau", .unit = "s", .min = 1e-6};
-
-const EffectInfo kEffects[] = {
+const EffectInfo kSensorEffects[] = {
     {"sensor.quadratic", "k2*a_i^2", "a_i", "bias", true, {{"k2", "g/g^2"}}, quadratic},
     {"sensor.cubic", "k3*a_i^3", "a_i", "bias", true, {{"k3", "g/g^3"}}, cubic},
     {"sensor.asymmetry", "ka*abs(a_i)", "a_i", "bias", true, {{"ka", "g/g"}}, asymmetry},
@@ -172,6 +170,6 @@ const EffectInfo kEffects[] = {
 
 }  // namespace
 
-std::span<const EffectInfo> sensor_effects() { return kEffects; }
+std::span<const EffectInfo> sensor_effects() { return kSensorEffects; }
 
 }  // namespace plumbline::sim

@@ -1,4 +1,4 @@
-// Effects without memory, written as one function each.
+// What effects are made of: those without memory are one function each.
 #pragma once
 
 #include <algorithm>
@@ -17,11 +17,20 @@ inline constexpr double kTurn_rad = 2 * std::numbers::pi;
 inline double sin_deg(double angle_deg) { return std::sin(angle_deg * kTurn_rad / 360); }
 inline double cos_deg(double angle_deg) { return std::cos(angle_deg * kTurn_rad / 360); }
 
+/// A time constant.
+inline const ParameterInfo kTau{.name = "tau", .unit = "s", .min = 1e-6};
+
 /// Which of the three axes a setting names.
 inline std::array<bool, 3> axis_mask(const EffectSetting& setting) {
   std::array<bool, 3> mask{};
   for (const std::size_t axis : setting.axes) mask[axis] = true;
   return mask;
+}
+
+/// An effect with a memory, a class of its own.
+template <class T>
+std::unique_ptr<Effect> make(const EffectContext& context) {
+  return std::make_unique<T>(context);
 }
 
 /// Input-referred term `f(moment, axis)` in g, on the axes of the setting.

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace plumbline {
+
+inline double square(double x) { return x * x; }
+
+}  // namespace plumbline
