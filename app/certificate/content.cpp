@@ -113,6 +113,11 @@ void add_summary(const Composer& c) {
                       ? Tone::warning
                       : Tone::plain;
   document.headline = headline(c);
+  for (const CertificateEvent& event : c.input.events) {
+    if (event.kind != "incomplete") continue;
+    document.tone = Tone::warning;
+    document.summary.push_back(sentence(c.tr.phrase(event.text)));
+  }
   document.summary.push_back(finding(c));
   document.summary.push_back(error_sentence(c));
   if (c.input.verification != nullptr) {

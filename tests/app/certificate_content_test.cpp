@@ -195,6 +195,18 @@ TEST(Certificate, UkrainianLeavesNothingUntranslated) {
   EXPECT_THAT(html, Not(HasSubstr("not stated")));
 }
 
+TEST(Certificate, UnfinishedRunIsToldOnTheFirstPage) {
+  CertificateExample example;
+  EXPECT_EQ(make_certificate(example.input()).tone, Tone::plain);
+  example.events = {{0, "incomplete", "the run is not finished: stopped after 42 poses"}};
+  const Document english = make_certificate(example.input());
+  EXPECT_EQ(english.summary.front(), "The run is not finished: stopped after 42 poses.");
+  EXPECT_EQ(english.tone, Tone::warning);
+  example.language = Language::uk;
+  EXPECT_EQ(make_certificate(example.input()).summary.front(),
+            "Вимірювання не завершено: зупинено після 42 положень.");
+}
+
 TEST(Certificate, UkrainianForWhatTheCoreSays) {
   const Translator uk(Language::uk), en(Language::en);
   const std::string reason =

@@ -191,15 +191,15 @@ function buildHead() {
   const arm = drawing.querySelector("#arm");
   arm.append(svg("rect", {class: "body", x: 68, y: 98, width: 52, height: 20, rx: 4}), svg("rect", {class: "body", x: 122, y: 86, width: 9, height: 44, rx: 3}));
   drawing.append(svg("circle", {class: "base", cx: 85, cy: 108, r: 6}));
-  drawing.append(svg("circle", {class: "dial", cx: 240, cy: 95, r: 62}), svg("text", {class: "mark quiet", x: 240, y: 190}, "spindle δ"));
+  drawing.append(svg("circle", {class: "dial", cx: 250, cy: 95, r: 62}), svg("text", {class: "mark quiet", x: 250, y: 190}, "spindle δ"));
   for (let d = 0; d < 360; d += 30) {
     const r = d * Math.PI / 180, a = d % 90 ? 58 : 54;
-    drawing.append(svg("line", {class: "tick", x1: 240 + a * Math.sin(r), y1: 95 - a * Math.cos(r), x2: 240 + 66 * Math.sin(r), y2: 95 - 66 * Math.cos(r)}));
+    drawing.append(svg("line", {class: "tick", x1: 250 + a * Math.sin(r), y1: 95 - a * Math.cos(r), x2: 250 + 66 * Math.sin(r), y2: 95 - 66 * Math.cos(r)}));
   }
-  for (const [d, x, y] of [[0, 240, 26], [90, 318, 99], [180, 240, 172], [270, 161, 99]]) drawing.append(svg("text", {class: "mark", x, y}, `${d}`));
-  drawing.append(svg("line", {id: "aim-delta", class: "aim", x1: 240, y1: 95, x2: 240, y2: 33}));
+  for (const [d, x, y] of [[0, 250, 26], [90, 328, 99], [180, 250, 172], [270, 172, 99]]) drawing.append(svg("text", {class: "mark", x, y}, `${d}`));
+  drawing.append(svg("line", {id: "aim-delta", class: "aim", x1: 250, y1: 95, x2: 250, y2: 33}));
   const needle = svg("g", {id: "needle-delta"});
-  needle.append(svg("line", {class: "needle", x1: 240, y1: 95, x2: 240, y2: 44}), svg("rect", {class: "body", x: 226, y: 81, width: 28, height: 28, rx: 4}));
+  needle.append(svg("line", {class: "needle", x1: 250, y1: 95, x2: 250, y2: 44}), svg("rect", {class: "body", x: 236, y: 81, width: 28, height: 28, rx: 4}));
   drawing.append(needle);
 }
 buildHead();
@@ -210,9 +210,9 @@ function showHead() {
   const {head, target} = status;
   const turn = (name, angle, x, y) => drawing.querySelector(name).setAttribute("transform", `rotate(${angle} ${x} ${y})`);
   turn("#arm", -head.h_deg, 85, 108); turn("#aim-arm", -target.h_deg, 85, 108);
-  turn("#needle-delta", head.delta_deg, 240, 95); turn("#aim-delta", target.delta_deg, 240, 95);
+  turn("#needle-delta", head.delta_deg, 250, 95); turn("#aim-delta", target.delta_deg, 250, 95);
   const line = `δ ${head.delta_deg.toFixed(3)}° (to ${target.delta_deg}°)   h ${head.h_deg.toFixed(3)}° (to ${target.h_deg}°)`;
-  text("pose", line + (head.homed ? "" : "   not homed"));
+  text("pose", line + (head.homed || !["idle", "homing", "recovering"].includes(status.state) ? "" : "   not homed"));
   drawing.setAttribute("aria-label", `Pose of the head: ${line}`);
 }
 
