@@ -61,7 +61,7 @@ std::string ShortPlan::text() const {
       "[recovery]\nwait_s = {}\nattempts_per_pose = {}\n",
       samples_per_pose, floor_known ? "noise_V = 0.0001\n" : "", 360 - delta_step_deg,
       delta_step_deg, (h_rows - 1) * h_step_deg, h_step_deg, 60 * patience(),
-      std::min(100L, std::lround(3 * patience())));
+      patience() > 1 ? 6 : 3);
 }
 
 std::size_t ShortPlan::poses() const { return static_cast<std::size_t>(deltas * h_rows + 1); }
