@@ -58,10 +58,12 @@ std::string ShortPlan::text() const {
       "[grid]\ndelta_deg = {{ start = 0, stop = {}, step = {} }}\n"
       "h_deg = {{ start = 0, stop = {}, step = {} }}\n"
       // On a machine without time for the drive's answers, a pose fails for no fault of the run's.
-      "[recovery]\nwait_s = {}\nattempts_per_pose = {}\n",
+      "[recovery]\nwait_s = {}\nattempts_per_pose = {}\n"
+      // What does not pass ends the run before the battery's own deadline.
+      "skipped_poses = 2\n",
       samples_per_pose, floor_known ? "noise_V = 0.0001\n" : "", 360 - delta_step_deg,
       delta_step_deg, (h_rows - 1) * h_step_deg, h_step_deg, 60 * patience(),
-      patience() > 1 ? 6 : 3);
+      std::min(100L, std::lround(3 * patience())));
 }
 
 std::size_t ShortPlan::poses() const { return static_cast<std::size_t>(deltas * h_rows + 1); }
