@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/certificate/certificate.h"
 #include "app/certificate/table_columns.h"
 #include "app/figure/svg_canvas.h"
@@ -32,7 +34,10 @@ table { border-collapse: collapse; width: 100%; margin: 10px 0 16px; font-size: 
         break-inside: avoid; }
 caption { text-align: left; font-weight: bold; padding: 4px 0; }
 th, td { padding: 3px 6px; border-bottom: 1px solid #ddd; text-align: right;
-         font-variant-numeric: tabular-nums; overflow-wrap: anywhere; }
+         font-variant-numeric: tabular-nums; }
+td { white-space: nowrap; }
+td:first-child, td.words { white-space: normal; }
+td.long { white-space: normal; overflow-wrap: anywhere; }
 thead th { border-bottom: 1.5px solid #222; vertical-align: bottom; }
 th:first-child, td:first-child, td.words, th.words { text-align: left; }
 td.words, th.words { padding-left: 14px; }
@@ -97,6 +102,17 @@ struct HtmlWriter {
   static const char* side(const Table& table, std::size_t column) {
     return column > 0 && column_anchor(table, column) == Anchor::start ? " class=\"words\"" : "";
   }
+  /// Only a word that would push the table off the page may be broken.
+  static std::string cell_class(const Table& table, std::size_t column, const std::string& cell) {
+    constexpr std::size_t kLongWord = 40;
+    std::size_t length = 0, longest = 0;
+    for (const char c : cell) {
+      length = c == ' ' ? 0 : length + 1;
+      longest = std::max(longest, length);
+    }
+    if (longest <= kLongWord) return side(table, column);
+    return *side(table, column) == '\0' ? " class=\"long\"" : " class=\"words long\"";
+  }
 
   void operator()(const Heading& heading) {
     text += fmt::format("<h2>{}</h2>\n", escape_xml(heading.text));
@@ -125,7 +141,7 @@ struct HtmlWriter {
     for (const auto& row : table.rows) {
       text += "<tr>";
       for (std::size_t c = 0; c < row.size(); ++c) {
-        text += fmt::format("<td{}>{}</td>", side(table, c), escape_xml(row[c]));
+        text += fmt::format("<td{}>{}</td>", cell_class(table, c, row[c]), escape_xml(row[c]));
       }
       text += "</tr>\n";
     }

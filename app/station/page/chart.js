@@ -53,13 +53,13 @@ function frame({c, width, height}, box, xs, ys, xText, yText) {
 const scale = (low, high, from, to) => (value) => from + (value - low) / (high - low) * (to - from);
 
 // rows: [t_s, x, y, z, T]; the newest `span` seconds of the node's clock.
-export function drawTrace(canvas, rows, span) {
+export function drawTrace(canvas, rows, span, note) {
   const to = surface(canvas);
   if (!to) return;
   const {c, width, height} = to;
   if (rows.length < 2) {
     c.fillStyle = colour("quiet"); c.textAlign = "center";
-    c.fillText("no samples yet", width / 2, height / 2);
+    c.fillText(note, width / 2, height / 2);
     return;
   }
   const last = rows[rows.length - 1][0];
@@ -166,7 +166,7 @@ export function drawTrend(canvas, series) {
   const widest = (values) => Math.max(0, ...values.map((v) => c.measureText(label(v, values)).width));
   const left = Math.max(widest(list), widest(steps)) + 10;
   const strip = ranges.length ? height * 0.24 : 0;
-  const box = {left, right: 40, top: 8, bottom: 20 + (strip ? strip + 14 : 0)};
+  const box = {left, right: 40, top: 8, bottom: 20 + (strip ? strip + 24 : 0)};
   const xAt = (i) => box.left + (i + 0.5) / points.length * (width - box.left - box.right);
   const yAt = scale(low, high, height - box.bottom, box.top);
   frame(to, box, {list: [], at: xAt}, {list, at: yAt}, "", "");

@@ -97,7 +97,7 @@ function trendCard(series) {
   const performance = series.performance;
   const index = (value) => value === null || value === undefined ? "–" : value.toFixed(2);
   figure.append(element("figcaption", `${series.name} / (${series.unit})`), element("canvas", "", {role: "img", "aria-label": `${series.name} over ${series.points.length} runs`}),
-    element("p", performance ? `mean ${performance.mean.toPrecision(6)}, s ${performance.s.toPrecision(2)}`
+    element("p", performance ? `mean ${performance.mean.toPrecision(6).replace("-", "−")}, s ${performance.s.toPrecision(2)}`
       + (performance.Ppk === null ? "" : `, Pp ${index(performance.Pp)}, Ppk ${index(performance.Ppk)}`)
       + (series.chart?.outside.length ? `; ${series.chart.outside.length} beyond the limits` : "") : "limits need two runs or more", {class: "figures"}));
   return figure;

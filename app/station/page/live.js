@@ -87,7 +87,9 @@ function showEvents(list) {
   lastEvents = key;
   id("events").replaceChildren(...newest.map((event) => {
     const item = document.createElement("li");
-    if (alarms.has(event.kind)) item.className = "alarm";
+    // Counts of what went wrong on the bus are none when they are all zero.
+    const harmless = event.kind === "bus" && / received([,;] 0 [^,;]+)+$/.test(event.text);
+    if (alarms.has(event.kind) && !harmless) item.className = "alarm";
     const time = document.createElement("time");
     time.dateTime = event.utc;
     time.textContent = event.utc.slice(11, 19);
@@ -234,7 +236,7 @@ function draw() {
   if (dirty && live && !id("view-live").hidden) {
     dirty = false;
     showHead();
-    drawTrace(id("trace"), rows, kSpan_s);
+    drawTrace(id("trace"), rows, kSpan_s, live.phase === "running" ? "no samples yet" : "traces are shown while a run is going on");
     const full = drawMap(id("map"), live.run?.delta_deg ? live.run : null, poses, axis, live.status?.target);
     text("map-scale", full === null ? "the first estimate needs poses at two tilts" : `axis ${"xyz"[axis]}: up to ${(full * 1000).toPrecision(2)} mm/s² at ${poses.length} positions; scale in mm/s², a dash marks negative ones`);
   }
