@@ -11,6 +11,7 @@
 #include "estimator/diagnosis/explain.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/verdict.h"
+#include "estimator/effects/code_evidence.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/axis_tools.h"
 #include "estimator/fit/eight_state_filter.h"
@@ -149,6 +150,11 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   work.quantized = std::move(quantized);
 }
 
+bool rounded_coarser_than_declared(const CalibrationInput& input, std::size_t axis) {
+  const auto& adc = input.description.adc;
+  return adc && coarser_lattice(codes_seen(input.run.samples.u_V[axis], *adc), *adc).has_value();
+}
+
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
   AxisWork work;
   const Eigen::VectorXd mean_V = mean_voltages(experiment.poses, axis);
@@ -178,10 +184,15 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
     work.own_V2 += free.variance_V2;
   }
   const NoisePowers identified_powers = noise_powers(work.record);
+  bool known = identified_powers.sum() > 0 || free.coarse;
+  if (!known && rounded_coarser_than_declared(experiment.input, axis)) {
+    // Rounding hides the noise within the dwells; how the pose means scatter tells of both.
+    work.record = without_record(identified);
+    known = true;
+  }
   work.pooled.power = Eigen::VectorXd::Zero(experiment.processes.count());
   work.pooled.power.head<NoiseProcesses::kFirstMarkov>() =
       identified_powers.head<NoiseProcesses::kFirstMarkov>();
-  const bool known = identified_powers.sum() > 0 || free.coarse;
   if (n > 4 && known) {
     const Eigen::MatrixXd a_g = experiment.A.leftCols<3>();
     work.test = test_residual(work.record, {work.y, experiment.A, a_g, experiment.processes,

@@ -36,6 +36,18 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
   }
 }
 
+namespace {
+
+/// What an axis does from code to code has a name where the codes prove it.
+bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (term.driver() == std::string("code_") + kAxisName[i])
+      return log.coarser_lattice[i] || !log.stuck_bits[i].empty();
+  return false;
+}
+
+}  // namespace
+
 CandidateList all_candidates(const VisitLog& log) {
   constexpr double kUnnamed = 7;
   CandidateList list;
@@ -49,6 +61,7 @@ CandidateList all_candidates(const VisitLog& log) {
     add_candidates(list, log, *list.owned.back());
   }
   for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
+    if (imitates_proven_rounding(log, *term)) continue;
     list.owned.push_back(std::move(term));
     add_candidates(list, log, *list.owned.back(), kUnnamed);
   }

@@ -79,7 +79,9 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       columns << jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n), beside;
       const Eigen::MatrixXd design = independent_columns(columns);
       const NoisePool pool(input.processes,
-                           free.coarse ? without_record(input.noise[i]) : input.noise[i],
+                           free.coarse || input.log.coarser_lattice[i]
+                               ? without_record(input.noise[i])
+                               : input.noise[i],
                            input.positioning_V2[i] + free.variance_V2);
       stage.noise[i] = pool.pool(mean_V - predicted[i], design,
                                  before != nullptr ? &(*before)[i].power : nullptr);

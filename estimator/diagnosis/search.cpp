@@ -116,7 +116,7 @@ class Search {
     const auto before = predict_means_V(input_.log, stage_.fit.parameters);
     const auto after = predict_means_V(input_.log, with.parameters);
     for (std::size_t i = 0; i < kAxisCount; ++i)
-      if ((after[i] - before[i]).lpNorm<Eigen::Infinity>() > input_.log.adc->lsb_V())
+      if ((after[i] - before[i]).lpNorm<Eigen::Infinity>() > input_.log.step_V(i))
         return log_chi_squared_tail(gain, dof);
     return std::log(std::max(f_tail(gain / dof, dof, kDofOfCoarseReadings), 1e-300));
   }

@@ -5,14 +5,18 @@
 namespace plumbline {
 namespace {
 
-// Rounding to a step that the description of the run does not declare.
+// Rounding to a step that the description of the run does not declare. How far the noise of a
+// reading rounds the stairs off is estimated with it: readings that hardly change say little of it.
 class Quantization final : public Effect {
  public:
   std::string id() const override { return "adc.quantization"; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"lsb", "V", ParameterRole::shape}, {"origin", "V", ParameterRole::index}};
+    return {{"lsb", "V", ParameterRole::shape},
+            {"origin", "V", ParameterRole::index},
+            {"noise", "V", ParameterRole::shape}};
   }
+  bool certain() const override { return true; }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     // Without a declared converter the smallest difference between two readings is its step.
     const std::optional<Lattice> lattice =
@@ -20,11 +24,12 @@ class Quantization final : public Effect {
                 : std::optional(Lattice{log.smallest_step_V[axis], log.lowest_V[axis]});
     // Noise of more than a step hides rounding from the means.
     if (!lattice || lattice->step_V == 0 || log.input_sd_V[axis] > 0.7 * lattice->step_V) return {};
-    return {{{lattice->step_V, lattice->origin_V}}};
+    const double noise_V = std::max(log.input_sd_V[axis], effect::kLeastNoise * lattice->step_V);
+    return {{{lattice->step_V, lattice->origin_V, noise_V}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double lsb_V = p[0];
-    const double sd = input.log.input_sd_V[input.axis] / lsb_V;
+    const double sd = std::min(p[2] / lsb_V, effect::kMostNoise);
     const double value = (input.output_V - p[1]) / lsb_V;  // in steps, as all of this
     const double nearest = std::round(value);
     double rounded = nearest;

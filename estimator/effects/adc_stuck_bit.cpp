@@ -5,19 +5,25 @@
 namespace plumbline {
 namespace {
 
-// One bit of the code held at 0 or 1.
+// One bit of the code held at 0 or 1. How far the noise of a reading rounds the steps off is
+// estimated with it.
 class StuckBitEffect final : public Effect {
  public:
   std::string id() const override { return "adc.stuck_bit"; }
   Subject subject() const override { return Subject::sensor; }
   bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"bit", "", ParameterRole::index}, {"value", "", ParameterRole::index}};
+    return {{"bit", "", ParameterRole::index},
+            {"value", "", ParameterRole::index},
+            {"noise", "V", ParameterRole::shape}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
-    for (const StuckBit& stuck : log.stuck_bits[axis])
-      starts.push_back({{static_cast<double>(stuck.bit), stuck.value ? 1.0 : 0.0}});
+    for (const StuckBit& stuck : log.stuck_bits[axis]) {
+      const double noise_V = std::max(
+          log.input_sd_V[axis], effect::kLeastNoise * std::ldexp(log.adc->lsb_V(), stuck.bit));
+      starts.push_back({{static_cast<double>(stuck.bit), stuck.value ? 1.0 : 0.0, noise_V}});
+    }
     return starts;
   }
   bool certain() const override { return true; }
@@ -28,7 +34,7 @@ class StuckBitEffect final : public Effect {
     const double size_V = adc.lsb_V() * std::ldexp(1.0, static_cast<int>(p[0]));
     const double half_code = 0.5 * adc.lsb_V() / size_V;
     const double value = (input.output_V - adc.min_V) / size_V + half_code;
-    const double sd = input.log.input_sd_V[input.axis] / size_V;
+    const double sd = std::min(p[2] / size_V, effect::kMostNoise);
     const bool set = p[1] > 0.5;
     double wrong = 0;
     for (double from = std::floor(value - effect::kReach * sd); from <= value + effect::kReach * sd;

@@ -101,6 +101,8 @@ std::vector<double> geometric(double first, double last, int count);
 /// Share of Gaussian noise of standard deviation `sd` about `value` that lies below `edge`; with no
 /// noise 0 or 1.
 double share_below(double edge, double value, double sd);
+inline constexpr double kLeastNoise = 0.02;  ///< steps, where a search for more starts
+inline constexpr double kMostNoise = 3;      ///< steps, beyond which nothing of them is left
 inline constexpr double kReach = 6;  ///< standard deviations beyond which noise does not come
 /// Mean of f(u + noise) over Gaussian noise of standard deviation `sd`: what averaging many
 /// readings leaves of a kink in f. Where f jumps, share_below() is smooth and this is not.

@@ -109,10 +109,18 @@ Eigen::MatrixXd step_contrasts(std::size_t samples) {
   return contrasts;
 }
 
+double VisitLog::step_V(std::size_t axis) const {
+  if (coarser_lattice[axis]) return coarser_lattice[axis]->step_V;
+  int missing = 0;
+  for (const StuckBit& stuck : stuck_bits[axis]) missing = std::max(missing, stuck.bit + 1);
+  return std::ldexp(adc->lsb_V(), missing);
+}
+
 bool VisitLog::is_coarse() const {
-  return adc && visits.front().count > 1 &&
-         std::any_of(sample_sd_V.begin(), sample_sd_V.end(),
-                     [&](double sd_V) { return is_coarse_against(*adc, sd_V); });
+  if (!adc || visits.front().count < 2) return false;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (is_coarse_against(step_V(i), sample_sd_V[i])) return true;
+  return false;
 }
 
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {

@@ -56,6 +56,8 @@ struct VisitLog {
   /// How many numbers describe the course of a dwell beside its mean.
   Eigen::Index dwell_contrasts() const { return contrasts.begin()->second.cols(); }
 
+  /// Step between neighbouring readings of an axis, as declared or as the codes show.
+  double step_V(std::size_t axis) const;
   /// Whether some axis reads with less noise than its converter needs to average rounding away.
   bool is_coarse() const;
   double first_s() const { return visits.front().t_arrival_s; }

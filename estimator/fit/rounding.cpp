@@ -59,9 +59,8 @@ double sd_before_rounding_V(double step_V, double recorded_V) {
   return std::sqrt(noise_before_rounding_V2(step_V, recorded_V * recorded_V));
 }
 
-bool is_coarse_against(const Adc& adc, double sample_sd_V) {
+bool is_coarse_against(double step_V, double sample_sd_V) {
   constexpr double kNoTrace = 0.7;  // of a step: 6e-5 of it are left
-  const double step_V = adc.lsb_V();
   return std::sqrt(noise_before_rounding_V2(step_V, sample_sd_V * sample_sd_V)) <=
          kNoTrace * step_V;
 }
@@ -80,7 +79,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
   const double white_V2 = noise_before_rounding_V2(step_V, recorded_V2);
   const double sigma_V = std::sqrt(white_V2);
   const Eigen::Index n = mean_V.size();
-  if (!is_coarse_against(adc, sample_sd_V)) return {mean_V, Eigen::VectorXd::Zero(n), false};
+  if (!is_coarse_against(step_V, sample_sd_V)) return {mean_V, Eigen::VectorXd::Zero(n), false};
 
   const double full_V2 = rounding_variance(step_V, sigma_V);
   const double mean_white_V2 = recorded_V2 / samples_per_mean;

@@ -7,12 +7,12 @@
 
 namespace plumbline {
 
-/// Whether noise of `sample_sd_V`, as recorded, is too small to average rounding away.
 /// Standard deviation of what was rounded to `step_V` when the rounded readings scatter by
 /// `recorded_V`.
 double sd_before_rounding_V(double step_V, double recorded_V);
 
-bool is_coarse_against(const Adc& adc, double sample_sd_V);
+/// Whether noise of `sample_sd_V`, as recorded, is too small to average rounding to `step_V` away.
+bool is_coarse_against(double step_V, double sample_sd_V);
 
 /// Readings of one axis with rounding, as a model sees it.
 struct RoundingFree {
