@@ -47,6 +47,7 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   struct Fit {
     bool good = false;
     double middle = 0;  // of the remainders
+    double spread = 0;
   };
   const auto fit = [&](double step) {
     double low = 0, high = 0;
@@ -56,7 +57,7 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
       high = std::max(high, off);
       if (high - low > tolerance) return Fit{};
     }
-    return Fit{true, 0.5 * (low + high)};
+    return Fit{true, 0.5 * (low + high), high - low};
   };
   // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
   // enough to be told from chance.
@@ -74,8 +75,10 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   // Between its points a lattice leaves codes out.
   if (static_cast<double>(codes.size()) > range / step + 2) return {};
   const double looks = std::log(kCoarsest / kFinest) / resolution;
+  // So many of the codes of a step lie within the spread: of a step of two, both.
+  const double allowed = std::floor(fit(step).spread + 0.05) + 1;
   const double log_chance = std::log(looks) - static_cast<double>(codes.size() - 2) *
-                                                  std::log(std::max(1.0, step / tolerance));
+                                                  std::log(std::max(1.0, step / allowed));
   if (log_chance > std::log(kChance)) return {};
   const double lsb_V = adc.lsb_V();
   return Lattice{step * lsb_V,

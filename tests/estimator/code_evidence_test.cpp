@@ -60,6 +60,16 @@ TEST(CodeEvidence, AStepThatIsNoMultipleOfTheDeclaredOneIsMeasured) {
   EXPECT_LT(std::abs(std::remainder(-2.5 - lattice->origin_V, lattice->step_V)), 1e-4);
 }
 
+TEST(CodeEvidence, FewCodesOfASoundConverterAreNoLattice) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> u_V(-2.6, -2.53);
+  for (int set = 0; set < 20; ++set) {
+    std::vector<double> readings;
+    for (int k = 0; k < 60; ++k) readings.push_back(rounded(u_V(random), kSixteenBits.lsb_V()));
+    EXPECT_FALSE(coarser_lattice(codes_seen(readings, kSixteenBits), kSixteenBits)) << set;
+  }
+}
+
 TEST(CodeEvidence, LowestBitsAllClearAreACoarserStep) {
   const auto codes = sweep([](double u, double lsb_V) {
     const auto code = std::llround((u + 5) / lsb_V) & ~7LL;
