@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "estimator/uncertainty/monte_carlo.h"
 
 namespace plumbline {
+
+class Effect;
 
 /// Four parameters of one axis, [K_ix K_iy K_iz] in V/g and U_i0 in V, with their covariance.
 struct AxisEstimate {
@@ -35,12 +38,53 @@ struct Convergence {
   std::vector<TriadEstimate> batch_ls;  ///< one per pose; meaningless before four poses
 };
 
+/// A parameter by the Kalman filter that has it in its state, and E_n against the batch fit.
+struct FilterEstimate {
+  double value = 0;
+  double u = 0;
+  double en = 0;
+};
+
 struct EffectParameter {
   std::string name;
   std::optional<std::size_t> axis;
   double value = 0;
   double u = 0;
   std::string unit;
+  std::optional<FilterEstimate> filter = {};  ///< nothing for an index, which is not estimated
+};
+
+/// How large an effect that was not found would have had to be: its amplitude at 5 standard
+/// uncertainties. Where it depends on when, where or how fast (a shape or an index that was
+/// searched over), the middle of all of them, and the best and the worst of them. Infinite: these
+/// poses do not show the effect, however large.
+struct DetectionLimit {
+  std::string id;
+  std::optional<std::size_t> axis;  ///< nothing for the head
+  std::string parameter;
+  double limit = 0;
+  double best = 0;
+  double worst = 0;
+  std::string unit;
+};
+
+/// Where a head can go.
+struct HeadReach {
+  double delta_min_deg = 0;
+  double delta_max_deg = 350;
+  double h_min_deg = 0;
+  double h_max_deg = 80;
+};
+
+/// Poses that tell an effect from what could pass for it.
+struct SeparatingPlan {
+  struct Stop {
+    double delta_deg = 0;
+    double h_deg = 0;
+  };
+  std::vector<Stop> stops;    ///< in visiting order, some more than once
+  double samples_factor = 1;  ///< dwell, in dwells of the run
+  double decides_sigma = 0;   ///< expected distance of the nearest rival, standard deviations
 };
 
 /// An effect that the 12-parameter model lacks and the data show.
@@ -51,7 +95,9 @@ struct FoundEffect {
   double p_value = 1;
   double heldout_gain = 0;
   std::vector<std::string> alternatives;
-  std::string separate_by;
+  std::string separate_by;              ///< words
+  SeparatingPlan separating_plan = {};  ///< no stops: nothing to decide, or poses do not decide it
+  std::string definition = {};          ///< of an effect that a user described, as they wrote it
 };
 
 /// Structure that no listed effect explains.
@@ -82,6 +128,7 @@ struct Diagnosis {
   double p_value = 1;  ///< of the whole test
   std::vector<FoundEffect> effects;
   std::vector<UnlistedStructure> unlisted;
+  std::vector<DetectionLimit> not_found;  ///< every effect that could have been found and was not
 };
 
 /// Input-referred errors in m/s² (volts / K_ii · g_n).
@@ -139,6 +186,8 @@ struct CalibrationInput {
 
 struct CalibrationOptions {
   std::uint64_t seed = 1;
+  std::vector<std::shared_ptr<const Effect>> own_effects = {};  ///< of the user; searched for too
+  std::optional<HeadReach> reach = {};  ///< for suggested poses; nothing: what the run visited
 };
 
 /// Everything `result.json` and the certificate say. When observability.rank < 4 nothing below it
@@ -187,6 +236,7 @@ struct CertifiedModel {
   TriadEstimate final;   ///< together with the effects
   std::vector<FoundEffect> effects;
   std::vector<UnlistedStructure> unlisted;
+  std::vector<std::shared_ptr<const Effect>> own_effects = {};  ///< that `effects` may name
 };
 
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,

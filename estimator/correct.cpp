@@ -19,8 +19,16 @@ bool needs_history(const std::string& id) {
          id.find("previous_pose") != std::string::npos;
 }
 
+/// Of an effect that a user described: what a reading alone does not tell.
+bool needs_a_head(const std::string& definition) {
+  for (const char* word : {"prev_", "pose", "delta_deg", "h_deg"})
+    if (definition.find(word) != std::string::npos) return true;
+  return false;
+}
+
 bool can_be_computed(const ActiveEffect& active) {
   const std::string id = active.effect->id();
+  if (needs_a_head(active.effect->definition())) return false;
   return active.effect->subject() == Subject::sensor && !needs_history(id) &&
          id != "env.base_field" && id != "adc.quantization" && id != "adc.mains_pickup";
 }

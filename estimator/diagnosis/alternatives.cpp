@@ -48,7 +48,7 @@ EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
 
 }  // namespace
 
-std::vector<std::string> find_alternatives(const SearchInput& input, const CandidateList& list,
+std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
                                            const CandidateResponses& responses,
                                            const SearchResult& result, std::size_t index) {
   const Candidate& found = result.evidence[index].candidate;
@@ -69,7 +69,7 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
     return found_gain - kIndistinguishable + kPricePerParameter * (free - found_free);
   };
 
-  std::vector<std::pair<double, std::string>> singles;
+  std::vector<Alternative> singles;
   // Responses at the final model: they hardly depend on the parameters.
   const CandidateGains gains_of(responses, without);
   const auto ranked =
@@ -85,17 +85,15 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
     const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
     if (without.chi2 - fit.chi2 < needed(std::max(free, found_free))) continue;
     const std::string id = candidate.effect->id();
-    if (std::none_of(singles.begin(), singles.end(),
-                     [&](const auto& s) { return s.second == id; })) {
-      singles.emplace_back(fit.chi2, id);
-    }
+    if (id != found.effect->id() &&
+        std::none_of(singles.begin(), singles.end(),
+                     [&](const Alternative& s) { return s.name == id; }))
+      singles.push_back({id, fit});
   }
-  std::sort(singles.begin(), singles.end());
-  std::vector<std::string> names;
-  for (auto& [chi2, id] : singles) {
-    if (id != found.effect->id()) names.push_back(std::move(id));
-  }
-  if (!names.empty()) return names;
+  std::stable_sort(singles.begin(), singles.end(), [](const Alternative& a, const Alternative& b) {
+    return a.fit.chi2 < b.fit.chi2;
+  });
+  if (!singles.empty()) return singles;
 
   // A sum: always the rival that helps most, until it explains as much.
   std::vector<Candidate> sum;
@@ -126,7 +124,7 @@ std::vector<std::string> find_alternatives(const SearchInput& input, const Candi
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
     std::string name;
     for (const std::string& id : ids) name += (name.empty() ? "" : "+") + id;
-    return {name};
+    return {{name, fit}};
   }
   return {};
 }

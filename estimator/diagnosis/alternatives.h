@@ -8,13 +8,19 @@
 
 namespace plumbline {
 
-/// Explanations that these data cannot tell from effect `index` of the result, each an id or
-/// several joined by "+", most likely first. `others` effects of the model stay as they are.
+/// An explanation that these data cannot tell from an effect that was found.
+struct Alternative {
+  std::string name;  ///< an id, or several joined by "+"
+  EnlargedFit fit;   ///< the model with it in place of the effect, its own effects last
+};
+
+/// Explanations that these data cannot tell from effect `index` of the result, most likely first.
+/// The other effects of the model stay as they are.
 ///
 /// A rival counts when replacing the effect by it costs less likelihood than noise would
 /// (`kIndistinguishable` in χ², more for every further parameter). Sums are looked for only as long
 /// as a single rival does not do. `responses` are those of the list under the result's whitening.
-std::vector<std::string> find_alternatives(const SearchInput& input, const CandidateList& list,
+std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
                                            const CandidateResponses& responses,
                                            const SearchResult& result, std::size_t index);
 

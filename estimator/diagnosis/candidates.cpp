@@ -54,7 +54,7 @@ CandidateList all_candidates(const VisitLog& log) {
   for (const Effect* effect : effect_catalogue()) add_candidates(list, log, *effect);
   if (log.is_coarse()) {
     for (Candidate& candidate : list.candidates)
-      candidate.of_one_coarse_reading = candidate.effect->id() == "rig.pose_outlier";
+      candidate.of_one_coarse_reading = candidate.effect->concerns_one_visit();
   }
   for (auto& effect : covariate_effects(log)) {
     list.owned.push_back(std::move(effect));

@@ -76,6 +76,8 @@ class CandidateGains {
   Eigen::MatrixXd of(const Eigen::MatrixXd& whitened) const;
   /// Free directions of a candidate; 0 when the model absorbs it.
   int dof(std::size_t candidate) const { return static_cast<int>(transform_[candidate].rows()); }
+  /// dof × columns; its product with the columns' amplitudes, squared, is what they would gain.
+  const Eigen::MatrixXd& transform(std::size_t candidate) const { return transform_[candidate]; }
   /// Removes from each column what the model's parameters take up.
   Eigen::MatrixXd project(const Eigen::MatrixXd& whitened) const;
 

@@ -5,6 +5,8 @@
 #include <cstdio>
 
 #include "estimator/diagnosis/alternatives.h"
+#include "estimator/diagnosis/detection_limits.h"
+#include "estimator/diagnosis/separation.h"
 #include "estimator/effects/smooth_term.h"
 
 namespace plumbline {
@@ -57,10 +59,22 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log, const Enlarg
   return reported;
 }
 
-void merge_names(std::vector<std::string>& into, const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    if (std::find(into.begin(), into.end(), name) == into.end()) into.push_back(name);
+/// What else effect `index` could be, and what would tell.
+void add_rivals(const SearchInput& input, const Diagnosed& diagnosed,
+                const CandidateResponses& responses, std::size_t index, FoundEffect& entry) {
+  const std::vector<Alternative> rivals =
+      find_alternatives(input, diagnosed.candidates, responses, diagnosed.search, index);
+  for (const Alternative& rival : rivals) {
+    auto& names = entry.alternatives;
+    if (std::find(names.begin(), names.end(), rival.name) == names.end())
+      names.push_back(rival.name);
   }
+  const Separation separation = separate(input, diagnosed.search, index, rivals, diagnosed.reach);
+  if (separation.words.empty() || entry.separate_by == separation.words) return;
+  entry.separate_by += (entry.separate_by.empty() ? "" : "; ") + separation.words;
+  // Further axes of the same effect rarely need other poses: the longest plan serves.
+  if (separation.plan.stops.size() > entry.separating_plan.stops.size())
+    entry.separating_plan = separation.plan;
 }
 
 std::string number(double value, const char* format) {
@@ -83,6 +97,12 @@ std::string describe(const FoundEffect& effect) {
   return text;
 }
 
+/// The same weakness of several axes is one effect with several axes, and so are several poses that
+/// went wrong each by itself.
+bool shares_an_entry(const Effect& effect) {
+  return effect.subject() == Subject::sensor || effect.concerns_one_visit();
+}
+
 /// One entry per id, axes and parameters together.
 std::vector<FoundEffect> report_effects(const VisitLog& log, const EnlargedFit& fit) {
   std::vector<FoundEffect> found;
@@ -90,8 +110,7 @@ std::vector<FoundEffect> report_effects(const VisitLog& log, const EnlargedFit& 
     const ActiveEffect& active = fit.parameters.effects[e];
     const std::string id = active.effect->id();
     auto entry = found.end();
-    // The same weakness of several axes is one effect with several axes.
-    if (active.effect->subject() == Subject::sensor) {
+    if (shares_an_entry(*active.effect)) {
       entry = std::find_if(found.begin(), found.end(),
                            [&](const FoundEffect& f) { return f.id == id; });
     }
@@ -99,6 +118,7 @@ std::vector<FoundEffect> report_effects(const VisitLog& log, const EnlargedFit& 
       FoundEffect fresh;
       fresh.id = id;
       fresh.p_value = 0;
+      fresh.definition = active.effect->definition();
       entry = found.insert(found.end(), std::move(fresh));
     }
     for (std::size_t axis : axes_of(active)) {
@@ -120,10 +140,9 @@ void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
   Diagnosis& diagnosis = diagnosed.diagnosis;
   diagnosis = {};
   std::vector<FoundEffect> found = report_effects(input.log, search.fit);
-  CandidateResponses responses;
-  if (!search.evidence.empty())
-    responses = candidate_responses(input.log, diagnosed.candidates, search.whitening,
-                                    search.fit.parameters);
+  const CandidateResponses responses =
+      candidate_responses(input.log, diagnosed.candidates, search.whitening, search.fit.parameters);
+  diagnosis.not_found = detection_limits(input, diagnosed.candidates, responses, search);
   for (std::size_t e = 0; e < search.evidence.size(); ++e) {
     const Effect& effect = *search.evidence[e].candidate.effect;
     const std::string id = effect.id();
@@ -137,9 +156,7 @@ void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
     for (FoundEffect& entry : found) {
       if (entry.id != id) continue;
       entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
-      if (!effect.certain())
-        merge_names(entry.alternatives,
-                    find_alternatives(input, diagnosed.candidates, responses, search, e));
+      if (!effect.certain()) add_rivals(input, diagnosed, responses, e, entry);
     }
   }
   std::erase_if(found, [](const FoundEffect& f) { return f.id.starts_with("unlisted:"); });
@@ -162,6 +179,39 @@ void describe_findings(const SearchInput& input, Diagnosed& diagnosed) {
   }
 }
 
+void attach_filter(Diagnosed& diagnosed, const Eigen::VectorXd& value, const Eigen::VectorXd& u) {
+  Diagnosis& diagnosis = diagnosed.diagnosis;
+  std::vector<std::size_t> next(diagnosis.effects.size(), 0);  // parameter of each entry
+  std::size_t unlisted = 0;
+  Eigen::Index row = 0;
+  for (const ActiveEffect& active : diagnosed.search.fit.parameters.effects) {
+    const Effect& effect = *active.effect;
+    std::vector<EffectParameter>* reported = nullptr;
+    std::size_t own = 0;
+    std::size_t* at = &own;
+    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
+      reported = &diagnosis.unlisted[unlisted++].parameters;
+    } else {
+      for (std::size_t k = 0; k < diagnosis.effects.size() && reported == nullptr; ++k) {
+        if (diagnosis.effects[k].id != effect.id()) continue;
+        if (!shares_an_entry(effect) && next[k] > 0) continue;  // that of another one
+        reported = &diagnosis.effects[k].parameters;
+        at = &next[k];
+      }
+    }
+    // As report_parameters() lists them.
+    const auto infos = effect.parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
+      EffectParameter& parameter = reported->at((*at)++);
+      if (!active.free[k]) continue;
+      const double difference = std::abs(value(row) - active.p[k]);
+      parameter.filter = {value(row), u(row), difference / (2 * std::hypot(u(row), parameter.u))};
+      ++row;
+    }
+  }
+}
+
 void attach_gains(Diagnosed& diagnosed, const std::vector<double>& gains) {
   Diagnosis& diagnosis = diagnosed.diagnosis;
   std::size_t unlisted = 0;
@@ -177,9 +227,15 @@ void attach_gains(Diagnosed& diagnosed, const std::vector<double>& gains) {
   }
 }
 
-Diagnosed diagnose(const SearchInput& input, const SearchOptions& options) {
+Diagnosed diagnose(const SearchInput& input, const SearchOptions& options,
+                   const CalibrationOptions& calibration) {
   Diagnosed diagnosed;
+  diagnosed.reach = calibration.reach.value_or(reach_of(input.log));
   diagnosed.candidates = all_candidates(input.log);
+  for (const auto& effect : calibration.own_effects) {
+    diagnosed.candidates.owned.push_back(effect);
+    add_candidates(diagnosed.candidates, input.log, *effect);
+  }
   diagnosed.search = search_effects(input, diagnosed.candidates, options);
   describe_findings(input, diagnosed);
   return diagnosed;

@@ -217,10 +217,6 @@ Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
   return all;
 }
 
-Eigen::VectorXd predict_stacked(const VisitLog& log, const EnlargedParameters& parameters) {
-  return stacked(predict_means_V(log, parameters), predict_dwells_V(log, parameters));
-}
-
 std::vector<double> difference_steps(const EnlargedParameters& parameters) {
   std::vector<double> steps;
   for (std::size_t i = 0; i < 4 * kAxisCount; ++i) steps.push_back(1e-6);
@@ -235,6 +231,10 @@ std::vector<double> difference_steps(const EnlargedParameters& parameters) {
 
 }  // namespace
 
+Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters) {
+  return stacked(predict_means_V(log, parameters), predict_dwells_V(log, parameters));
+}
+
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {
   const Eigen::VectorXd centre = parameters.free_values();
   const std::vector<double> steps = difference_steps(parameters);
@@ -245,10 +245,10 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
     Eigen::VectorXd values = centre;
     values(j) = centre(j) + steps[column];
     moved.set_free_values(values);
-    const Eigen::VectorXd above = predict_stacked(log, moved);
+    const Eigen::VectorXd above = predict_stacked_V(log, moved);
     values(j) = centre(j) - steps[column];
     moved.set_free_values(values);
-    jacobian.col(j) = (above - predict_stacked(log, moved)) / (2 * steps[column]);
+    jacobian.col(j) = (above - predict_stacked_V(log, moved)) / (2 * steps[column]);
   });
   return jacobian;
 }
@@ -272,7 +272,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   constexpr int kMaxIterations = 20;
   const Eigen::VectorXd measured = stacked(observed.mean_V, observed.dwell_V);
   const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
-    return whitening.apply(measured - predict_stacked(log, parameters));
+    return whitening.apply(measured - predict_stacked_V(log, parameters));
   };
   EnlargedFit fit;
   fit.parameters = start;

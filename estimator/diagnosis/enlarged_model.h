@@ -64,6 +64,9 @@ Observations observe(const MeasurementSet& set, const VisitLog& log);
 Eigen::Index mean_rows(const VisitLog& log);
 Eigen::Index stacked_rows(const VisitLog& log);
 
+/// The prediction as such a vector, V.
+Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters);
+
 /// Derivatives of the stacked prediction by the free parameters, by central differences with steps
 /// fitted to each parameter's size.
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters);

@@ -70,50 +70,47 @@ NoiseModel filter_noise(const ExplainInput& input, const SearchInput& search,
   return in_filter_terms(search.noise[axis], input.processes, found.noise[axis], span_s);
 }
 
-/// Which error of the joint filter's head an effect is; nothing for other effects.
-std::optional<std::size_t> joint_state_of(const ActiveEffect& active) {
-  const std::string id = active.effect->id();
-  if (id == "rig.base_roll") return 0;
-  if (id == "rig.tilt_index") return 1;
-  if (id == "rig.axis_skew") return 2;
-  return std::nullopt;
-}
-
-/// All axes and the errors of the head in one filter, where the head has such errors; the other
-/// effects are taken away from the readings.
+/// The whole enlarged model in one filter: all axes, the head and the effects' parameters.
 std::optional<JointEstimate> joint_estimate(const ExplainInput& input, const SearchInput& search,
-                                            const SearchResult& found,
-                                            const PerAxis<Eigen::VectorXd>& predicted_V) {
-  JointFilterOptions options;
-  options.head_sd_rad = {0, 0, 0};
-  options.flicker_correlation_s = filter_options(input.poses).flicker_correlation_s;
-  EnlargedParameters head_alone = found.fit.parameters;
-  head_alone.effects.clear();
-  for (const ActiveEffect& active : found.fit.parameters.effects) {
-    const auto state = joint_state_of(active);
-    if (!state) continue;
-    options.head_sd_rad[*state] = JointFilterOptions{}.head_sd_rad[*state];
-    head_alone.effects.push_back(active);
-  }
-  if (head_alone.effects.empty()) return std::nullopt;
-  const auto head_V = predict_means_V(search.log, head_alone);
+                                            const SearchResult& found) {
+  JointReadings readings;
   PerAxis<NoiseModel> noise;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+  const auto& effects = found.fit.parameters.effects;
+  const bool within_dwell = std::any_of(effects.begin(), effects.end(), [](const auto& active) {
+    return active.effect->within_dwell();
+  });
+  const auto n = std::ssize(input.poses);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     noise[axis] = filter_noise(input, search, found, axis);
-  std::vector<JointVisit> visits;
-  for (std::size_t k = 0; k < input.poses.size(); ++k) {
-    const auto row = static_cast<Eigen::Index>(k);
-    JointVisit visit{
-        input.poses[k].t_mean_s, input.poses[k].pose.delta_deg, input.poses[k].pose.h_deg, {}, {}};
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      visit.mean_V[axis] =
-          found.observed.mean_V[axis](row) - (predicted_V[axis](row) - head_V[axis](row));
-      visit.variance_V2[axis] = own_variance_V2(input, found, axis, k);
-    }
-    visits.push_back(visit);
+    readings.mean_V[axis] = found.observed.mean_V[axis];
+    readings.variance_V2[axis].resize(n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      readings.variance_V2[axis](k) =
+          own_variance_V2(input, found, axis, static_cast<std::size_t>(k));
+    const Eigen::Index contrasts = within_dwell ? kDwellContrasts : 0;
+    readings.dwell_V[axis] = found.observed.dwell_V[axis].leftCols(contrasts);
+    readings.dwell_sd_V[axis] = found.whitening.dwell_sd_V[axis].head(contrasts);
   }
-  JointEstimate estimate = run_joint_filter(visits, search.log.gamma, noise, options);
-  if (!estimate.converged) return std::nullopt;
+  for (const PoseMean& pose : input.poses) readings.t_s.push_back(pose.t_mean_s);
+  const JointModel model = [&](const Eigen::VectorXd& values) {
+    EnlargedParameters parameters = found.fit.parameters;
+    parameters.set_free_values(values);
+    JointPrediction prediction{predict_stacked_V(search.log, parameters),
+                               prediction_jacobian(search.log, parameters)};
+    if (!within_dwell) {
+      const Eigen::Index rows = mean_rows(search.log);
+      prediction.value_V.conservativeResize(rows);
+      prediction.slope.conservativeResize(rows, Eigen::NoChange);
+    }
+    return prediction;
+  };
+  JointFilterOptions options;
+  options.flicker_correlation_s = filter_options(input.poses).flicker_correlation_s;
+  // Linearised about the batch fit first: a shape that starts elsewhere may run away on its
+  // tangent.
+  JointEstimate estimate =
+      run_joint_filter(readings, model, found.fit.parameters.free_values(), noise, options);
+  if (!estimate.converged || !estimate.covariance.allFinite()) return std::nullopt;
   return estimate;
 }
 
@@ -158,7 +155,7 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
                                    heldout_dwell_gain(search.log, found.observed, found.whitening,
                                                       found.fit, k, partitions));
       // One pose's own error cannot be predicted from other poses.
-      const bool own = removed.effect->id() == "rig.pose_outlier" || removed.effect->certain();
+      const bool own = removed.effect->concerns_one_visit() || removed.effect->certain();
       if (gain > 0 || own) {
         gains.push_back(std::max(gain, 0.0));
         continue;
@@ -183,8 +180,9 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                            start, &input.pooled};
   SearchOptions search_options;
   search_options.seed = options.seed;
-  Diagnosed diagnosed = diagnose(search, search_options);
+  Diagnosed diagnosed = diagnose(search, search_options, options);
   SearchResult& found = diagnosed.search;
+  result.diagnosis.not_found = diagnosed.diagnosis.not_found;
   if (found.evidence.empty()) return std::nullopt;
 
   std::vector<double> gains;
@@ -206,7 +204,12 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
 
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   const auto n = std::ssize(input.poses);
-  const auto joint = joint_estimate(input, search, found, predicted_V);
+  const auto joint = joint_estimate(input, search, found);
+  if (joint) {
+    const Eigen::Index effects = joint->value.size() - 12;
+    attach_filter(diagnosed, joint->value.tail(effects),
+                  joint->covariance.diagonal().tail(effects).cwiseMax(0).cwiseSqrt());
+  }
   WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -307,6 +310,9 @@ EnlargedParameters restore_model(const CertifiedModel& model, const VisitLog& lo
   }
   for (const FoundEffect& found : model.effects) {
     for (const Effect* effect : effect_catalogue()) {
+      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, restored);
+    }
+    for (const auto& effect : model.own_effects) {
       if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, restored);
     }
     for (const auto& effect : owned) {

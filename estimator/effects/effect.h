@@ -82,6 +82,10 @@ class Effect {
   /// The same response by parameters as one would state them: positive amplitudes, angles within
   /// one turn.
   virtual void normalise(std::vector<double>&) const {}
+  /// Whether it is the fault of one visit alone, which no other visit can predict.
+  virtual bool concerns_one_visit() const { return false; }
+  /// What a user wrote to describe it; empty for built-in effects.
+  virtual std::string definition() const { return {}; }
   /// What belonged to one run only does not carry over to another set of the same unit.
   virtual bool carries_over() const { return true; }
 };

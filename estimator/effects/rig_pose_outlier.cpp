@@ -9,8 +9,9 @@ class PoseOutlier final : public Effect {
   std::string id() const override { return "rig.pose_outlier"; }
   Subject subject() const override { return Subject::head; }
   bool repeats() const override { return true; }
+  bool concerns_one_visit() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"pose", "", ParameterRole::index},
+    return {{"poses", "", ParameterRole::index},
             {"delta", "deg", ParameterRole::amplitude},
             {"h", "deg", ParameterRole::amplitude}};
   }

@@ -3,23 +3,21 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
-
-#include "estimator/fit/least_squares.h"
-#include "estimator/kinematics.h"
+#include <optional>
 
 namespace plumbline {
 namespace {
 
-using State = Eigen::Matrix<double, kJointStateCount, 1>;
-using Covariance = Eigen::Matrix<double, kJointStateCount, kJointStateCount>;
 using Eigen::Index;
 
-constexpr double kRadians = std::numbers::pi / 180;
+constexpr Index kAxes = static_cast<Index>(kAxisCount);
+constexpr Index kDrifts =
+    2 * kAxes;  ///< flicker and random walk of each axis, after the parameters
 
 double squared(double value) { return value * value; }
 double coefficient(const NoiseTerm& term) { return term.present ? term.value : 0.0; }
 
-/// What the axes' drifts do between visits.
+/// What an axis's drifts do between visits.
 struct Drift {
   double flicker_variance = 0;
   double flicker_rate_per_s = 0;
@@ -36,136 +34,144 @@ Drift drift_of(const NoiseModel& noise, const JointFilterOptions& options) {
           squared(coefficient(noise.K)), noise.walk_decay_per_s};
 }
 
-void predict(const PerAxis<Drift>& drifts, double dt_s, State& x, Covariance& P) {
-  State factor = State::Ones();
-  State enters = State::Zero();
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const Drift& drift = drifts[axis];
-    const Index at = kJointDrift + 2 * static_cast<Index>(axis);
-    factor(at) = std::exp(-drift.flicker_rate_per_s * dt_s);
-    enters(at) = -drift.flicker_variance * std::expm1(-2 * drift.flicker_rate_per_s * dt_s);
-    factor(at + 1) = std::exp(-drift.walk_decay_per_s * dt_s);
-    enters(at + 1) = drift.walk_density * (drift.walk_decay_per_s > 0
-                                               ? -std::expm1(-2 * drift.walk_decay_per_s * dt_s) /
-                                                     (2 * drift.walk_decay_per_s)
-                                               : dt_s);
+/// One pass: the parameters counted from where the readings are linearised, so that they keep their
+/// digits, and the drifts.
+class Pass {
+ public:
+  Pass(const PerAxis<Drift>& drifts, const Eigen::VectorXd& prior_sd) : drifts_(drifts) {
+    parameters_ = prior_sd.size();
+    x_ = Eigen::VectorXd::Zero(parameters_ + kDrifts);
+    Eigen::VectorXd variance(x_.size());
+    variance.head(parameters_) = prior_sd.cwiseAbs2();
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const Drift& drift = drifts_[axis];
+      variance(drift_at(axis)) = drift.flicker_variance;
+      variance(drift_at(axis) + 1) =
+          drift.walk_decay_per_s > 0 ? drift.walk_density / (2 * drift.walk_decay_per_s) : 0;
+    }
+    P_ = variance.asDiagonal();
   }
-  x = x.cwiseProduct(factor);
-  P = factor.asDiagonal() * P * factor.asDiagonal();
-  P.diagonal() += enters;
-}
 
-Eigen::Vector3d force_g(const JointVisit& visit, const Eigen::Vector3d& head_rad, double gamma) {
-  return specific_force_g(
-      {kRadians * visit.delta_deg, kRadians * visit.h_deg + head_rad(1), head_rad(0), head_rad(2)},
-      gamma);
-}
+  void predict(double dt_s) {
+    Eigen::VectorXd factor = Eigen::VectorXd::Ones(x_.size());
+    Eigen::VectorXd enters = Eigen::VectorXd::Zero(x_.size());
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const Drift& drift = drifts_[axis];
+      const Index at = drift_at(axis);
+      factor(at) = std::exp(-drift.flicker_rate_per_s * dt_s);
+      enters(at) = -drift.flicker_variance * std::expm1(-2 * drift.flicker_rate_per_s * dt_s);
+      factor(at + 1) = std::exp(-drift.walk_decay_per_s * dt_s);
+      enters(at + 1) = drift.walk_density * (drift.walk_decay_per_s > 0
+                                                 ? -std::expm1(-2 * drift.walk_decay_per_s * dt_s) /
+                                                       (2 * drift.walk_decay_per_s)
+                                                 : dt_s);
+    }
+    x_ = x_.cwiseProduct(factor);
+    P_ = factor.asDiagonal() * P_ * factor.asDiagonal();
+    P_.diagonal() += enters;
+  }
 
-/// Specific force and its derivatives by the three errors of the head.
-struct Force {
-  Eigen::Vector3d a_g;
-  Eigen::Matrix3d slope;
+  /// One reading, less its prediction where it is linearised. `axis`: whose drifts it carries.
+  void update(const Eigen::VectorXd& slope, std::optional<std::size_t> axis, double left_V,
+              double variance_V2) {
+    Eigen::VectorXd h = Eigen::VectorXd::Zero(x_.size());
+    h.head(parameters_) = slope;
+    if (axis) h(drift_at(*axis)) = h(drift_at(*axis) + 1) = 1;
+    const Eigen::VectorXd Ph = P_ * h;
+    const double variance = h.dot(Ph) + variance_V2;
+    const double innovation_V = left_V - h.dot(x_);
+    const Eigen::VectorXd gain = Ph / variance;
+    // The prior dominates as long as the parameters are less certain than the reading.
+    if (axis && slope.dot(Ph.head(parameters_)) < 0.5 * variance) {
+      nis_ += squared(innovation_V) / variance;
+      ++counted_;
+    }
+    x_ += gain * innovation_V;
+    P_ -= gain * Ph.transpose();
+    const Eigen::VectorXd w = P_ * h;
+    P_ += (variance_V2 * gain - w) * gain.transpose();
+  }
+
+  void symmetrise() { P_ = (0.5 * (P_ + P_.transpose())).eval(); }
+  Eigen::VectorXd moved() const { return x_.head(parameters_); }
+  Eigen::MatrixXd covariance() const { return P_.topLeftCorner(parameters_, parameters_); }
+  double mean_nis() const { return counted_ > 0 ? nis_ / static_cast<double>(counted_) : 0; }
+
+ private:
+  Index drift_at(std::size_t axis) const { return parameters_ + 2 * static_cast<Index>(axis); }
+
+  const PerAxis<Drift>& drifts_;
+  Index parameters_ = 0;
+  Eigen::VectorXd x_;
+  Eigen::MatrixXd P_;
+  double nis_ = 0;
+  long counted_ = 0;
 };
 
-Force linearised(const JointVisit& visit, const Eigen::Vector3d& head_rad, double gamma) {
-  constexpr double kStep_rad = 1e-5;
-  Force force{force_g(visit, head_rad, gamma), {}};
-  for (Index i = 0; i < 3; ++i) {
-    const Eigen::Vector3d step = kStep_rad * Eigen::Vector3d::Unit(i);
-    force.slope.col(i) =
-        (force_g(visit, head_rad + step, gamma) - force_g(visit, head_rad - step, gamma)) /
-        (2 * kStep_rad);
+/// A hundred thousand times as wide as what all readings say of each parameter alone.
+Eigen::VectorXd prior_sd(const JointReadings& readings, const Eigen::MatrixXd& slope) {
+  constexpr double kWide = 1e5;
+  const Index n = std::ssize(readings.t_s);
+  Eigen::VectorXd information = Eigen::VectorXd::Zero(slope.cols());
+  for (Index i = 0; i < kAxes; ++i) {
+    const auto axis = static_cast<std::size_t>(i);
+    const Eigen::VectorXd weight = readings.variance_V2[axis].cwiseInverse();
+    information += slope.middleRows(i * n, n).cwiseAbs2().transpose() * weight;
+    const Eigen::VectorXd& sd_V = readings.dwell_sd_V[axis];
+    for (Index d = 0; d < sd_V.size(); ++d)
+      information += slope.middleRows((kAxes + i * sd_V.size() + d) * n, n)
+                         .cwiseAbs2()
+                         .colwise()
+                         .sum()
+                         .transpose() /
+                     squared(sd_V(d));
   }
-  return force;
-}
-
-/// Ordinary least squares of each axis with an ideal head: where the first pass is linearised.
-State first_guess(const std::vector<JointVisit>& visits, double gamma) {
-  State guess = State::Zero();
-  const auto n = std::ssize(visits);
-  Eigen::MatrixXd A(n, 4);
-  Eigen::VectorXd y(n);
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    for (Index k = 0; k < n; ++k) {
-      const JointVisit& visit = visits[static_cast<std::size_t>(k)];
-      A.row(k) << force_g(visit, Eigen::Vector3d::Zero(), gamma).transpose(), 1;
-      y(k) = visit.mean_V[axis];
-    }
-    guess.segment<4>(4 * static_cast<Index>(axis)) = solve_least_squares(A, y).x;
-  }
-  return guess;
+  return kWide * information.cwiseSqrt().cwiseInverse();
 }
 
 }  // namespace
 
-JointEstimate run_joint_filter(const std::vector<JointVisit>& visits, double gamma,
-                               const PerAxis<NoiseModel>& noise,
+JointEstimate run_joint_filter(const JointReadings& readings, const JointModel& model,
+                               const Eigen::VectorXd& start, const PerAxis<NoiseModel>& noise,
                                const JointFilterOptions& options) {
-  assert(!visits.empty());
+  assert(!readings.t_s.empty());
   PerAxis<Drift> drifts;
-  State prior_variance = State::Constant(squared(options.parameter_sd));
-  for (Index i = 0; i < 3; ++i)
-    prior_variance(kJointRoll + i) = squared(options.head_sd_rad[static_cast<std::size_t>(i)]);
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     drifts[axis] = drift_of(noise[axis], options);
-    const Index at = kJointDrift + 2 * static_cast<Index>(axis);
-    prior_variance(at) = drifts[axis].flicker_variance;
-    prior_variance(at + 1) = drifts[axis].walk_decay_per_s > 0
-                                 ? drifts[axis].walk_density / (2 * drifts[axis].walk_decay_per_s)
-                                 : 0;
-  }
-
-  State about = first_guess(visits, gamma);
+  const Index n = std::ssize(readings.t_s);
+  const Index contrasts = readings.dwell_sd_V[0].size();
   JointEstimate result;
+  result.value = start;
   for (int pass = 0; pass < options.most_passes && !result.converged; ++pass) {
-    // Parameters are far from zero and their prior is wide: counted from where the pass is
-    // linearised, they keep their digits.
-    State x = State::Zero();
-    x.head<kJointDrift>() = about.head<kJointDrift>();
-    x.segment<3>(kJointRoll).setZero();
-    Covariance P = prior_variance.asDiagonal();
-    double t_s = visits.front().t_s;
-    double nis = 0;
-    long counted = 0;
-    for (const JointVisit& visit : visits) {
-      predict(drifts, visit.t_s - t_s, x, P);
-      t_s = visit.t_s;
-      const Eigen::Vector3d head_rad = about.segment<3>(kJointRoll);
-      const Force force = linearised(visit, head_rad, gamma);
-      for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-        const Index first = 4 * static_cast<Index>(axis);
-        const Index drift = kJointDrift + 2 * static_cast<Index>(axis);
-        const Eigen::Vector3d K = about.segment<3>(first);
-        State h = State::Zero();
-        h.segment<3>(first) = force.a_g;
-        h(first + 3) = h(drift) = h(drift + 1) = 1;
-        h.segment<3>(kJointRoll) = force.slope.transpose() * K;
-        // K·a about the point of linearisation: K̄·a̅ + a̅·(K − K̄) + K̄·slope·(head − head̄).
-        const double expected_V = h.dot(x) - h.segment<3>(kJointRoll).dot(head_rad);
-        const State Ph = P * h;
-        const double variance = h.dot(Ph) + visit.variance_V2[axis];
-        const double innovation_V = visit.mean_V[axis] - expected_V;
-        const State gain = Ph / variance;
-        x += gain * innovation_V;
-        P -= gain * Ph.transpose();
-        const State w = P * h;
-        P += (visit.variance_V2[axis] * gain - w) * gain.transpose();
-        if (variance < 1e-3 * squared(options.parameter_sd)) {
-          nis += squared(innovation_V) / variance;
-          ++counted;
+    const JointPrediction about = model(result.value);
+    Pass filter(drifts, prior_sd(readings, about.slope));
+    double t_s = readings.t_s.front();
+    for (Index k = 0; k < n; ++k) {
+      const double now_s = readings.t_s[static_cast<std::size_t>(k)];
+      filter.predict(now_s - t_s);
+      t_s = now_s;
+      for (Index i = 0; i < kAxes; ++i) {
+        const auto axis = static_cast<std::size_t>(i);
+        const Index row = i * n + k;
+        filter.update(about.slope.row(row), axis, readings.mean_V[axis](k) - about.value_V(row),
+                      readings.variance_V2[axis](k));
+        for (Index d = 0; d < contrasts; ++d) {
+          const Index at = (kAxes + i * contrasts + d) * n + k;
+          if (about.slope.row(at).isZero(0)) continue;  // says nothing about any parameter
+          filter.update(about.slope.row(at), std::nullopt,
+                        readings.dwell_V[axis](k, d) - about.value_V(at),
+                        squared(readings.dwell_sd_V[axis](d)));
         }
       }
-      P = (0.5 * (P + P.transpose())).eval();
+      filter.symmetrise();
     }
-    const State moved = (x - about).cwiseAbs();
+    const Eigen::VectorXd moved = filter.moved();
+    result.covariance = filter.covariance();
     constexpr double kMoved = 1e-3;
-    result.converged = true;
-    for (Index i = 0; i < kJointDrift; ++i)
-      result.converged = result.converged && moved(i) <= kMoved * std::sqrt(P(i, i));
-    about = x;
-    result.value = x.head<kJointDrift>();
-    result.covariance = P.topLeftCorner<kJointDrift, kJointDrift>();
-    result.mean_nis = counted > 0 ? nis / static_cast<double>(counted) : 0;
+    result.converged =
+        (moved.array().abs() <= kMoved * result.covariance.diagonal().array().sqrt()).all();
+    result.value += moved;
+    result.mean_nis = filter.mean_nis();
   }
   return result;
 }

@@ -7,23 +7,64 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "estimator/kinematics.h"
 
 namespace plumbline {
 namespace {
 
-using Parameters = Eigen::Matrix<double, kJointParameterCount, 1>;
+// Twelve parameters, then the base's roll, the tilt's index and the spindle's skew.
+constexpr Eigen::Index kParameters = 15;
+using Parameters = Eigen::Matrix<double, kParameters, 1>;
 constexpr double kRadians = 3.14159265358979323846 / 180;
 constexpr double kSd_V = 6e-5;
 
+struct JointVisit {
+  double t_s = 0;
+  double delta_deg = 0;
+  double h_deg = 0;
+  PerAxis<double> mean_V{};
+};
+
 double predicted_V(const Parameters& p, const JointVisit& visit, std::size_t axis) {
-  const Eigen::Vector3d a =
-      specific_force_g({kRadians * visit.delta_deg, kRadians * visit.h_deg + p(kJointTiltIndex),
-                        p(kJointRoll), p(kJointSkew)},
-                       1);
+  const Eigen::Vector3d a = specific_force_g(
+      {kRadians * visit.delta_deg, kRadians * visit.h_deg + p(13), p(12), p(14)}, 1);
   const auto first = 4 * static_cast<Eigen::Index>(axis);
   return p.segment<3>(first).dot(a) + p(first + 3);
+}
+
+JointPrediction prediction(const std::vector<JointVisit>& visits, const Parameters& p) {
+  const auto n = std::ssize(visits);
+  JointPrediction result{Eigen::VectorXd(3 * n), Eigen::MatrixXd(3 * n, kParameters)};
+  for (Eigen::Index row = 0; row < 3 * n; ++row) {
+    const JointVisit& visit = visits[static_cast<std::size_t>(row % n)];
+    const auto axis = static_cast<std::size_t>(row / n);
+    result.value_V(row) = predicted_V(p, visit, axis);
+    for (Eigen::Index i = 0; i < kParameters; ++i) {
+      Parameters up = p, down = p;
+      up(i) += 1e-6;
+      down(i) -= 1e-6;
+      result.slope(row, i) = (predicted_V(up, visit, axis) - predicted_V(down, visit, axis)) / 2e-6;
+    }
+  }
+  return result;
+}
+
+JointEstimate run_filter(const std::vector<JointVisit>& visits, const PerAxis<NoiseModel>& noise,
+                         const Parameters& start) {
+  JointReadings readings;
+  const auto n = std::ssize(visits);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    readings.mean_V[axis].resize(n);
+    for (Eigen::Index k = 0; k < n; ++k)
+      readings.mean_V[axis](k) = visits[static_cast<std::size_t>(k)].mean_V[axis];
+    readings.variance_V2[axis] = Eigen::VectorXd::Constant(n, kSd_V * kSd_V);
+    readings.dwell_V[axis].resize(n, 0);
+  }
+  for (const JointVisit& visit : visits) readings.t_s.push_back(visit.t_s);
+  return run_joint_filter(readings, [&](const Eigen::VectorXd& p) { return prediction(visits, p); },
+                          start, noise, {});
 }
 
 std::vector<JointVisit> measure(const Parameters& truth, double walk_V, std::uint64_t seed) {
@@ -40,7 +81,6 @@ std::vector<JointVisit> measure(const Parameters& truth, double walk_V, std::uin
       for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
         visit.mean_V[axis] =
             predicted_V(truth, visit, axis) + drift_V[axis] + kSd_V * normal(random);
-        visit.variance_V2[axis] = kSd_V * kSd_V;
         drift_V[axis] += walk_V * normal(random);
       }
       visits.push_back(visit);
@@ -55,7 +95,7 @@ Parameters some_truth(std::uint64_t seed) {
   Parameters truth;
   truth << 0.032002, -0.0017435, 7.4811e-5, -2.5865, 0.0022174, 0.031399, 0.00016485, -2.4363,
       -0.00033471, -0.0017407, -0.032812, -2.3423, 0, 0, 0;
-  for (Eigen::Index i = 0; i < kJointParameterCount; ++i)
+  for (Eigen::Index i = 0; i < kParameters; ++i)
     truth(i) += (i >= 12 ? 0.005 : i % 4 < 3 ? 3e-4 : 0.03) * normal(random);
   return truth;
 }
@@ -68,7 +108,7 @@ struct Batch {
 
 Batch batch_fit(const std::vector<JointVisit>& visits, Parameters p) {
   const auto rows = 3 * std::ssize(visits);
-  Eigen::MatrixXd J(rows, kJointParameterCount);
+  Eigen::MatrixXd J(rows, kParameters);
   Eigen::VectorXd r(rows);
   Eigen::MatrixXd inverse;
   for (int round = 0; round < 4; ++round) {
@@ -76,7 +116,7 @@ Batch batch_fit(const std::vector<JointVisit>& visits, Parameters p) {
       const JointVisit& visit = visits[static_cast<std::size_t>(row / 3)];
       const auto axis = static_cast<std::size_t>(row % 3);
       r(row) = (visit.mean_V[axis] - predicted_V(p, visit, axis)) / kSd_V;
-      for (Eigen::Index i = 0; i < kJointParameterCount; ++i) {
+      for (Eigen::Index i = 0; i < kParameters; ++i) {
         Parameters up = p, down = p;
         up(i) += 1e-6;
         down(i) -= 1e-6;
@@ -98,10 +138,10 @@ TEST(JointFilter, AgreesWithBatchNonlinearLeastSquares) {
   for (int run = 0; run < kRuns; ++run) {
     const Parameters truth = some_truth(100 + static_cast<std::uint64_t>(run));
     const auto visits = measure(truth, 0, static_cast<std::uint64_t>(run));
-    const JointEstimate joint = run_joint_filter(visits, 1, {}, {});
+    const JointEstimate joint = run_filter(visits, {}, some_truth(7));
     EXPECT_TRUE(joint.converged);
     const Batch batch = batch_fit(visits, some_truth(7));
-    for (Eigen::Index i = 0; i < kJointParameterCount; ++i) {
+    for (Eigen::Index i = 0; i < kParameters; ++i) {
       const double u = std::sqrt(joint.covariance(i, i));
       EXPECT_NEAR(u, batch.u(i), 0.01 * batch.u(i));
       const double en = std::abs(joint.value(i) - batch.value(i)) / (2 * std::hypot(u, batch.u(i)));
@@ -112,7 +152,7 @@ TEST(JointFilter, AgreesWithBatchNonlinearLeastSquares) {
     nees += error.dot(joint.covariance.inverse() * error);
     nis += joint.mean_nis;
   }
-  EXPECT_GE(within, 0.95 * kRuns * kJointParameterCount);
+  EXPECT_GE(within, 0.95 * kRuns * kParameters);
   EXPECT_LT(largest, 0.02);  // the same optimum
   EXPECT_NEAR(nees / kRuns, 15, 3.29 * std::sqrt(30.0 / kRuns));
   EXPECT_NEAR(nis / kRuns, 1, 0.06);
@@ -126,7 +166,7 @@ TEST(JointFilter, FollowsDriftsThatTheBatchTakesForSignal) {
   for (int run = 0; run < kRuns; ++run) {
     const Parameters truth = some_truth(300 + static_cast<std::uint64_t>(run));
     const auto visits = measure(truth, 1e-4, 900 + static_cast<std::uint64_t>(run));
-    const JointEstimate joint = run_joint_filter(visits, 1, noise, {});
+    const JointEstimate joint = run_filter(visits, noise, some_truth(7));
     const Parameters error = joint.value - truth;
     nees += error.dot(joint.covariance.inverse() * error);
     nis += joint.mean_nis;

@@ -1,0 +1,178 @@
+#include "estimator/diagnosis/detection_limits.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr double kSigmas = 5;
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+bool is_in_model(const SearchResult& result, const Candidate& candidate) {
+  return std::any_of(result.evidence.begin(), result.evidence.end(), [&](const Evidence& e) {
+    return e.candidate.effect == candidate.effect &&
+           (candidate.effect->subject() == Subject::head || e.candidate.axis == candidate.axis);
+  });
+}
+
+/// Limits of one amplitude over the hypotheses of one family.
+struct Amplitude {
+  const Candidate* first = nullptr;
+  std::size_t parameter = 0;
+  Eigen::Index together_with = 0;  ///< amplitudes of the family
+  std::vector<double> limits;
+};
+
+DetectionLimit limit_of(const Candidate& candidate, const ParameterInfo& info,
+                        std::vector<double> limits) {
+  std::sort(limits.begin(), limits.end());
+  DetectionLimit limit;
+  limit.id = candidate.effect->id();
+  if (candidate.effect->subject() == Subject::sensor) limit.axis = candidate.axis;
+  limit.parameter = info.name;
+  limit.unit = info.unit;
+  limit.limit = limits[limits.size() / 2];
+  limit.best = limits.front();
+  limit.worst = limits.back();
+  return limit;
+}
+
+void add_amplitudes(const Candidate& candidate, const Eigen::MatrixXd& transform,
+                    std::vector<Amplitude>& amplitudes) {
+  const auto infos = candidate.effect->parameters();
+  Eigen::Index count = 0;
+  for (std::size_t k = 0; k < infos.size(); ++k)
+    count += infos[k].role == ParameterRole::amplitude && candidate.hypothesis.p[k] != 0 ? 1 : 0;
+  Eigen::Index column = 0;
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    if (infos[k].role != ParameterRole::amplitude || candidate.hypothesis.p[k] == 0) continue;
+    // The inverse of the columns' products is transformᵀ·transform.
+    const double limit = transform.rows() < count ? kInfinite
+                                                  : kSigmas * std::abs(candidate.hypothesis.p[k]) *
+                                                        transform.col(column).norm();
+    ++column;
+    auto it = std::find_if(amplitudes.begin(), amplitudes.end(), [&](const Amplitude& a) {
+      return a.parameter == k && a.first->family == candidate.family;
+    });
+    if (it == amplitudes.end())
+      it = amplitudes.insert(amplitudes.end(), {&candidate, k, count, {}});
+    it->limits.push_back(limit);
+  }
+}
+
+/// An effect whose size is a shape, on one axis: sizes and by how many σ their responses stand out.
+struct Size {
+  const Candidate* first = nullptr;
+  std::vector<std::pair<double, double>> course;  ///< size, σ
+
+  /// From the size that shows least to the one that shows most.
+  void sort() {
+    std::sort(course.begin(), course.end());
+    if (course.front().second > course.back().second) std::reverse(course.begin(), course.end());
+  }
+  /// Index of the first size that stands out; course.size() when none does.
+  std::size_t crossing() const {
+    return static_cast<std::size_t>(
+        std::find_if(course.begin(), course.end(),
+                     [](const auto& c) { return c.second >= kSigmas; }) -
+        course.begin());
+  }
+  /// Sizes to be looked at next: beyond the weak end, or between the two about the limit.
+  std::vector<double> next() const {
+    constexpr int kSizes = 8;
+    const std::size_t at = crossing();
+    std::vector<double> sizes;
+    if (at == course.size() || course.size() < 2) return sizes;
+    const double from = at == 0 ? course[0].first : course[at - 1].first;
+    const double ratio = at == 0 ? course[0].first / course[1].first
+                                 : std::pow(course[at].first / from, 1.0 / (kSizes + 1));
+    for (int k = 1; k <= kSizes; ++k) sizes.push_back(from * std::pow(ratio, k));
+    return sizes;
+  }
+  double limit() const {
+    const std::size_t at = crossing();
+    if (at == course.size()) return kInfinite;
+    if (at == 0) return course[0].first;
+    const auto& [weak, weak_sigma] = course[at - 1];
+    const auto& [strong, strong_sigma] = course[at];
+    return weak + (strong - weak) * (kSigmas - weak_sigma) / (strong_sigma - weak_sigma);
+  }
+};
+
+double sigmas(const CandidateGains& gains, std::size_t candidate) {
+  return gains.dof(candidate) == 0 ? 0 : 1 / gains.transform(candidate)(0, 0);
+}
+
+}  // namespace
+
+std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
+                                             const CandidateResponses& responses,
+                                             const SearchResult& result) {
+  const CandidateGains gains(responses, result.fit);
+  std::vector<Amplitude> amplitudes;
+  std::vector<Size> sizes;
+  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
+    const Candidate& candidate = list.candidates[c];
+    if (candidate.handicap > 0 || is_in_model(result, candidate)) continue;
+    const auto infos = candidate.effect->parameters();
+    const auto has = [&](ParameterRole role) {
+      return std::any_of(infos.begin(), infos.end(),
+                         [&](const ParameterInfo& info) { return info.role == role; });
+    };
+    if (has(ParameterRole::amplitude)) {
+      add_amplitudes(candidate, gains.transform(c), amplitudes);
+    } else if (infos.front().role == ParameterRole::shape && infos.size() == 1) {
+      if (sizes.empty() || sizes.back().first->effect != candidate.effect ||
+          sizes.back().first->axis != candidate.axis)
+        sizes.push_back({&candidate, {}});
+      sizes.back().course.emplace_back(candidate.hypothesis.p.front(), sigmas(gains, c));
+    }
+  }
+
+  std::vector<DetectionLimit> limits;
+  for (const Amplitude& a : amplitudes) {
+    const ParameterInfo info = a.first->effect->parameters()[a.parameter];
+    // An amplitude that also stands in a larger family is stated by the smaller one.
+    const bool smaller =
+        std::any_of(amplitudes.begin(), amplitudes.end(), [&](const Amplitude& other) {
+          return other.first->effect == a.first->effect && other.first->axis == a.first->axis &&
+                 other.parameter == a.parameter && other.together_with < a.together_with;
+        });
+    if (!smaller) limits.push_back(limit_of(*a.first, info, a.limits));
+  }
+
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    CandidateList closer;
+    std::vector<Size*> owner;
+    for (Size& size : sizes) {
+      size.sort();
+      for (const double value : size.next()) {
+        Candidate candidate = *size.first;
+        candidate.hypothesis.p.front() = value;
+        closer.candidates.push_back(std::move(candidate));
+        owner.push_back(&size);
+      }
+    }
+    if (owner.empty()) break;
+    const CandidateResponses closer_responses =
+        candidate_responses(input.log, closer, result.whitening, result.fit.parameters);
+    const CandidateGains closer_gains(closer_responses, result.fit);
+    for (std::size_t c = 0; c < owner.size(); ++c)
+      owner[c]->course.emplace_back(closer.candidates[c].hypothesis.p.front(),
+                                    sigmas(closer_gains, c));
+  }
+  for (Size& size : sizes) {
+    size.sort();
+    limits.push_back(
+        limit_of(*size.first, size.first->effect->parameters().front(), {size.limit()}));
+  }
+  std::stable_sort(limits.begin(), limits.end(),
+                   [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
+  return limits;
+}
+
+}  // namespace plumbline

@@ -1,0 +1,151 @@
+// What stands beside a diagnosis: limits of what was not found, the filter's view of what was, and
+// poses that would tell it from its rivals.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/calibrate.h"
+#include "estimator/kinematics.h"
+#include "tests/estimator/synthetic_run.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Contains;
+using testing::Field;
+using testing::HasSubstr;
+
+const Adc kSixteenBits{16, -5.0, 0.0};
+
+Calibration calibrated(const SyntheticRun& data, const CalibrationOptions& options = {}) {
+  return calibrate({data.run, &data.still, data.description}, options);
+}
+
+const DetectionLimit* limit_of(const Calibration& result, const std::string& id,
+                               std::optional<std::size_t> axis, const std::string& parameter) {
+  for (const DetectionLimit& limit : result.diagnosis.not_found)
+    if (limit.id == id && limit.axis == axis && limit.parameter == parameter) return &limit;
+  return nullptr;
+}
+
+TEST(DetectionLimits, OfAQuadraticIsWhatPlainLeastSquaresSays) {
+  const SyntheticRun data = synthetic_run(1, kSixteenBits);
+  const Calibration result = calibrated(data);
+  const DetectionLimit* limit = limit_of(result, "sensor.quadratic", 0, "k2");
+  ASSERT_NE(limit, nullptr);
+  EXPECT_EQ(limit->unit, "g/g^2");
+  // 60 means of 20 samples with 0.3 mV: the uncertainty of a fifth column beside the four.
+  const auto n = std::ssize(data.run.poses);
+  Eigen::MatrixXd A(n, 4);
+  Eigen::VectorXd square(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Pose& pose = data.run.poses[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d a =
+        specific_force(pose.delta_deg, pose.h_deg, 9.8101 / kStandardGravity_mps2).a_g;
+    A.row(k) << a.transpose(), 1;
+    square(k) = a.x() * a.x();
+  }
+  const Eigen::VectorXd left = square - A * A.colPivHouseholderQr().solve(square);
+  const double expected = 5 * 3e-4 / std::sqrt(20.0) / 0.032 / left.norm();
+  EXPECT_NEAR(limit->limit, expected, 0.15 * expected);  // the noise itself is estimated
+  EXPECT_EQ(limit->best, limit->limit);
+}
+
+TEST(DetectionLimits, StandForEverythingThatWasNotFound) {
+  const SyntheticRun data = synthetic_run(2, kSixteenBits);
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.diagnosis.verdict, Verdict::clean);
+  for (const char* id : {"sensor.cubic", "sensor.asymmetry", "sensor.hysteresis", "sensor.warmup",
+                         "sensor.drift", "sensor.scale_drift", "sensor.bias_step",
+                         "sensor.settling", "sensor.dead_zone", "sensor.saturation"})
+    EXPECT_THAT(result.diagnosis.not_found, Contains(Field(&DetectionLimit::id, id)));
+  for (const char* id : {"rig.base_roll", "rig.tilt_index", "rig.axis_skew", "rig.h_scale",
+                         "rig.index_slip", "rig.pose_outlier"}) {
+    const auto& all = result.diagnosis.not_found;
+    const auto it = std::find_if(all.begin(), all.end(),
+                                 [&](const DetectionLimit& limit) { return limit.id == id; });
+    ASSERT_NE(it, all.end()) << id;
+    EXPECT_FALSE(it->axis.has_value()) << id;
+    // Some thousandths of a degree to some tenths.
+    EXPECT_GT(it->best, 1e-5) << id;
+    EXPECT_LE(it->best, it->limit) << id;
+    EXPECT_LE(it->limit, it->worst) << id;
+  }
+  // A dead zone is stated by its width, clipping by its level: within the range of a sensor.
+  const DetectionLimit* dead = limit_of(result, "sensor.dead_zone", 0, "w");
+  ASSERT_NE(dead, nullptr);
+  EXPECT_GT(dead->limit, 1e-4);
+  EXPECT_LT(dead->limit, 0.2);
+  const DetectionLimit* clipped = limit_of(result, "sensor.saturation", 0, "L");
+  ASSERT_NE(clipped, nullptr);
+  EXPECT_GT(clipped->limit, 0.8);
+  EXPECT_LT(clipped->limit, 1.001);
+}
+
+TEST(DetectionLimits, WhatIsTwiceAsLargeIsFoundAndAQuarterOfItIsNot) {
+  const double limit_g =
+      limit_of(calibrated(synthetic_run(3, kSixteenBits)), "sensor.quadratic", 0, "k2")->limit;
+  int found = 0, false_alarms = 0;
+  for (std::uint64_t seed = 10; seed < 14; ++seed) {
+    SyntheticOptions options;
+    options.k2_x_V_per_g2 = 2 * limit_g * 0.032;
+    const Calibration strong = calibrated(synthetic_run(seed, kSixteenBits, options));
+    found += strong.diagnosis.effects.empty() ? 0 : 1;
+    EXPECT_EQ(strong.diagnosis.effects.empty(),
+              limit_of(strong, "sensor.quadratic", 0, "k2") != nullptr);
+    options.k2_x_V_per_g2 = 0.25 * limit_g * 0.032;
+    false_alarms +=
+        calibrated(synthetic_run(seed, kSixteenBits, options)).diagnosis.effects.empty() ? 0 : 1;
+  }
+  EXPECT_EQ(found, 4);
+  EXPECT_EQ(false_alarms, 0);
+}
+
+TEST(Findings, TheFilterHasTheEffectInItsState) {
+  SyntheticOptions options;
+  options.k2_x_V_per_g2 = 0.02 * 0.032;
+  const Calibration result = calibrated(synthetic_run(4, kSixteenBits, options));
+  ASSERT_EQ(result.diagnosis.effects.size(), 1u);
+  const FoundEffect& found = result.diagnosis.effects.front();
+  EXPECT_EQ(found.id, "sensor.quadratic");
+  ASSERT_EQ(found.parameters.size(), 1u);
+  const EffectParameter& k2 = found.parameters.front();
+  ASSERT_TRUE(k2.filter.has_value());
+  EXPECT_NEAR(k2.filter->value, 0.02, 4 * k2.filter->u);
+  EXPECT_NEAR(k2.filter->u, k2.u, 0.2 * k2.u);
+  EXPECT_NE(k2.filter->value, k2.value);  // two ways to compute
+  EXPECT_LT(k2.filter->en, 0.3);
+  for (const double en : result.final.agreement_en) EXPECT_LT(en, 0.3);
+}
+
+TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
+  // On z a square and a slope that changes with the sign differ only below the horizontal.
+  SyntheticRun data = synthetic_run(5, kSixteenBits);
+  for (const Pose& pose : data.run.poses) {
+    const double a_z = std::sin(pose.h_deg * std::numbers::pi / 180);
+    for (std::size_t i = pose.first; i < pose.first + pose.count; ++i)
+      data.run.samples.u_V[2][i] += 0.08 * -0.0328 * a_z * a_z;
+  }
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
+  const FoundEffect& found = result.diagnosis.effects.front();
+  ASSERT_FALSE(found.alternatives.empty()) << found.id;
+  ASSERT_FALSE(found.separate_by.empty());
+  for (const std::string& rival : found.alternatives)
+    EXPECT_THAT(found.separate_by, HasSubstr(rival));
+  ASSERT_FALSE(found.separating_plan.stops.empty()) << found.separate_by;
+  EXPECT_GE(found.separating_plan.decides_sigma, 5);
+  // Nothing is asked of a head that it cannot do.
+  const Calibration limited = calibrated(data, {.reach = HeadReach{0, 350, -40, 80}});
+  for (const auto& stop : limited.diagnosis.effects.front().separating_plan.stops) {
+    EXPECT_GE(stop.h_deg, -40);
+    EXPECT_LE(stop.h_deg, 80);
+  }
+}
+
+}  // namespace
+}  // namespace plumbline
