@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/certificate/certificate_files.h"
+#include "app/config/rig_description.h"
 #include "app/config/run_description.h"
 #include "app/io/csv.h"
 #include "app/io/evaluation_json.h"
@@ -12,6 +14,7 @@
 #include "app/io/result_json.h"
 #include "app/io/sha256.h"
 #include "app/issue_time.h"
+#include "app/sequencer/separation_plan.h"
 #include "app/summary.h"
 
 namespace plumbline::app {
@@ -53,6 +56,22 @@ bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limit
   return outcome.verification && !within_limits(*outcome.verification, limits).value_or(true);
 }
 
+/// One row for each parameter: the largest limit of the axes that show the effect at all.
+std::vector<NotFound> not_found_rows(const Diagnosis& diagnosis) {
+  std::vector<NotFound> rows;
+  for (const DetectionLimit& limit : diagnosis.not_found) {
+    if (!std::isfinite(limit.limit)) continue;
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const NotFound& r) {
+      return r.id == limit.id && r.parameter == limit.parameter && r.unit == limit.unit;
+    });
+    if (row == rows.end())
+      row = rows.insert(rows.end(), {limit.id, {}, limit.parameter, 0, limit.unit});
+    if (limit.axis) row->axes.push_back(*limit.axis);
+    row->limit = std::max(row->limit, limit.limit);
+  }
+  return rows;
+}
+
 Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& outcome,
                            OutputFolder& folder) {
   Provenance provenance = job.provenance;
@@ -70,16 +89,41 @@ Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& 
       .result_sha256 = sha256(result),
       .started_utc = job.started_utc,
       .finished_utc = job.finished_utc,
+      .not_found = not_found_rows(outcome.calibration.diagnosis),
       .signing = job.style.signing ? &*job.style.signing : nullptr};
   if (auto done = write_certificate(certificate, folder); !done) return done;
   if (outcome.verification) {
     const Json json = evaluation_json(*outcome.verification, 0, job.description.limits, provenance);
     if (auto done = folder.write("evaluation.json", file_text(json)); !done) return done;
   }
+  const Plan separation = separation_plan(job, outcome.calibration.diagnosis);
+  if (!separation.steps.empty()) {
+    if (auto done = folder.write("separate.csv", to_csv(separation)); !done) return done;
+  }
   return folder.publish();
 }
 
 }  // namespace
+
+Result<void> add_own_effects(const std::filesystem::path& path, CalibrationJob& job) {
+  if (path.empty()) return {};
+  auto effects = read_own_effects(path, job.description.reference_C);
+  if (!effects) return fail(effects.error());
+  if (auto good = check_columns(*effects, job.run.samples); !good) return good;
+  auto hash = sha256_of_file(path);
+  if (!hash) return fail(hash.error());
+  job.provenance.input_sha256.emplace_back(path.string(), *std::move(hash));
+  job.own_effects = *std::move(effects);
+  return {};
+}
+
+Calibration calibrate_job(const CalibrationJob& job) {
+  return calibrate(
+      {.run = job.run,
+       .static_record = job.static_record.size() == 0 ? nullptr : &job.static_record,
+       .description = job.description},
+      {.seed = job.provenance.seed, .own_effects = job.own_effects, .reach = job.reach});
+}
 
 Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64_t seed) {
   CalibrationJob job;
@@ -123,6 +167,8 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   job.description = *std::move(description);
   job.description.dut.serial = summary.header.serial;
   job.provenance.dut = job.description.dut;
+  if (const auto rig = parse_rig_description(summary.header.config_toml, job.source); rig)
+    job.reach = reach_of(*rig);
   job.started_utc = summary.header.started_utc;
   job.finished_utc = summary.finished_utc;
   job.provenance.chain_head = summary.chain_head;
@@ -154,11 +200,7 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
   if (!folder) return fail(folder.error());
 
   CalibrationOutcome outcome;
-  outcome.calibration =
-      calibrate({.run = job.run,
-                 .static_record = job.static_record.size() == 0 ? nullptr : &job.static_record,
-                 .description = job.description},
-                {.seed = job.provenance.seed});
+  outcome.calibration = calibrate_job(job);
   const Calibration& calibration = outcome.calibration;
   if (auto good = check_observable(calibration.observability, job.source, job.run.poses.size());
       !good) {
@@ -171,11 +213,16 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
     const CertifiedModel model{.twelve = calibration.estimates.batch_ls,
                                .final = calibration.final.batch_ls,
                                .effects = calibration.diagnosis.effects,
-                               .unlisted = calibration.diagnosis.unlisted};
+                               .unlisted = calibration.diagnosis.unlisted,
+                               .own_effects = job.own_effects};
     outcome.verification = evaluate(model, job.verification, job.description);
   }
 
   if (auto done = write_results(job, outcome, *folder); !done) return fail(done.error());
+  if (separating_steps(outcome.calibration.diagnosis, 1).empty()) {
+    std::error_code ignored;  // of an earlier calibration, when there is one
+    std::filesystem::remove(out / "separate.csv", ignored);
+  }
 
   outcome.exit_code =
       exceeds_limits(outcome, job.description.limits) ? ExitCode::limits_exceeded : ExitCode::done;

@@ -10,6 +10,7 @@
 
 #include "app/certificate/certificate.h"
 #include "app/certificate/dcc/signature.h"
+#include "app/config/own_effects.h"
 #include "app/exit_code.h"
 #include "app/provenance.h"
 #include "estimator/calibrate.h"
@@ -36,6 +37,8 @@ struct CalibrationJob {
   std::string started_utc;  ///< of a stored run; empty: not known
   std::string finished_utc;
   CertificateStyle style;
+  OwnEffects own_effects;          ///< of the user, searched for like the listed ones
+  std::optional<HeadReach> reach;  ///< for suggested poses; nothing: what the run visited
 };
 
 struct CalibrationFiles {
@@ -50,6 +53,13 @@ Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64
 Result<CalibrationJob> job_from_database(const std::filesystem::path& database, storage::RunId run,
                                          std::uint64_t seed);
 
+/// Reads effects that a user described (own_effects.h); an empty path: none. Refuses those that
+/// need columns which the job's data do not have.
+Result<void> add_own_effects(const std::filesystem::path& path, CalibrationJob& job);
+
+/// The engine alone, nothing written.
+Calibration calibrate_job(const CalibrationJob& job);
+
 struct CalibrationOutcome {
   Calibration calibration;
   std::optional<Evaluation> verification;
@@ -57,9 +67,10 @@ struct CalibrationOutcome {
   std::string summary;                  ///< for a person; the last line says what came out
 };
 
-/// Calibrates and writes result.json, the certificate in its forms and, with verification poses,
-/// evaluation.json into `out`: all of them or, on failure, none. Refuses poses that do not
-/// determine the twelve parameters, naming the unobservable direction.
+/// Calibrates and writes result.json, the certificate in its forms, with verification poses
+/// evaluation.json and, where further poses would tell an effect from another, separate.csv
+/// (a plan: the run once more with those poses) into `out`: all of them or, on failure, none.
+/// Refuses poses that do not determine the twelve parameters, naming the unobservable direction.
 Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesystem::path& out);
 
 }  // namespace plumbline::app

@@ -145,6 +145,11 @@ std::string summary(const RunDescription& description, const Calibration& calibr
   text += error_rows(calibration, verification);
   text += fmt::format("diagnosis: {}: {}\n", to_string(calibration.diagnosis.verdict),
                       calibration.diagnosis.reason);
+  for (const FoundEffect& effect : calibration.diagnosis.effects) {
+    if (!effect.separate_by.empty())
+      text += fmt::format("to tell {} apart: {}{}\n", effect.id, effect.separate_by,
+                          effect.separating_plan.stops.empty() ? "" : " (separate.csv)");
+  }
   text += fmt::format("decision: {}\n", to_words(calibration.decision.status));
   return text + conclusion(description, calibration, verification) + "\n";
 }

@@ -15,6 +15,7 @@ struct CalibrateOptions {
   std::string database;
   storage::RunId run = 0;
   std::string out;
+  std::string effects;
   std::uint64_t seed = 1;
   bool scalar = false;
   ScalarFiles scalar_files;
@@ -54,6 +55,7 @@ Result<ExitCode> run_calibrate(const CalibrateOptions& options) {
   auto job = job_of(options);
   if (!job) return fail(job.error());
   job->style = *std::move(style);
+  if (auto added = add_own_effects(options.effects, *job); !added) return fail(added.error());
   const auto outcome = perform(*job, options.out);
   if (!outcome) return fail(outcome.error());
   std::cout << outcome->summary;
@@ -87,6 +89,10 @@ void add_calibrate(CLI::App& program, Invocation& invocation) {
   sub->add_option("--out", options->out,
                   "Folder for result.json and the certificate; created when absent")
       ->required();
+  auto* effects =
+      sub->add_option("--effects", options->effects,
+                      "Effects of your own to be searched for like the listed ones (TOML; "
+                      "app/examples/effects.toml is one to start from)");
   add_certificate_options(*sub, options->certificate);
   sub->add_option("--seed", options->seed, "Seed of everything random (default 1)");
   auto* scalar =
@@ -95,7 +101,8 @@ void add_calibrate(CLI::App& program, Invocation& invocation) {
                     "parameters; with angles in the file the head is cross-checked)")
           ->needs(samples)
           ->needs(config)
-          ->excludes(static_record);
+          ->excludes(static_record)
+          ->excludes(effects);
   sub->add_option("--columns", options->scalar_files.columns,
                   "With --scalar: which column is which axis, as in x=ax_raw,y=ay_raw,z=az_raw "
                   "(default x=ux_V,y=uy_V,z=uz_V)")

@@ -28,7 +28,7 @@ struct CorrectOptions {
 Result<ExitCode> run_correct(const CorrectOptions& options) {
   const auto description = read_run_description(options.config);
   if (!description) return fail(description.error());
-  const auto calibration = read_result_json(options.calibration);
+  const auto calibration = read_result_json(options.calibration, description->reference_C);
   if (!calibration) return fail(calibration.error());
   const std::string& serial = description->dut.serial;
   if (!serial.empty() && !calibration->dut.serial.empty() && serial != calibration->dut.serial) {

@@ -36,6 +36,8 @@ struct DryRunArguments {
   std::string operator_name;
   CertificateOptions certificate;
   ServeOptions serve;
+  std::string effects;
+  bool separate = false;
 };
 
 Result<RigDescription> rig_description(const DryRunArguments& arguments) {
@@ -86,6 +88,8 @@ Result<ExitCode> dry_run(const DryRunArguments& arguments) {
                                      .out = arguments.out,
                                      .seed = arguments.seed,
                                      .style = *style,
+                                     .separate = arguments.separate,
+                                     .effects = arguments.effects,
                                      .resume_hint = hint});
   if (*station) (*station)->let_viewers_see_the_end();
   return code;
@@ -109,6 +113,11 @@ void add_dry_run(CLI::App& program, Invocation& invocation) {
   sub->add_option("--db", arguments->database, "run database instead of run.db in that folder");
   sub->add_option("--serial", arguments->serial, "of the unit, instead of the one in rig.toml");
   sub->add_option("--operator", arguments->operator_name, "who measures; noted with the run");
+  sub->add_flag("--separate", arguments->separate,
+                "measure at once, in the same run, the poses that tell effects apart, and decide "
+                "again");
+  sub->add_option("--effects", arguments->effects,
+                  "effects of your own, searched for like the listed ones (TOML)");
   add_certificate_options(*sub, arguments->certificate);
   add_serve_options(*sub, arguments->serve);
   sub->callback([arguments, &invocation] {

@@ -35,7 +35,7 @@ Result<void> check_same_unit(const std::string& calibrated, const std::string& d
 Result<ExitCode> run_evaluate(const EvaluateOptions& options) {
   const auto description = read_run_description(options.config);
   if (!description) return fail(description.error());
-  const auto calibration = read_result_json(options.calibration);
+  const auto calibration = read_result_json(options.calibration, description->reference_C);
   if (!calibration) return fail(calibration.error());
   if (auto same = check_same_unit(calibration->dut.serial, description->dut.serial); !same) {
     return fail(same.error());

@@ -15,6 +15,7 @@
 #include "app/sequencer/control_socket.h"
 #include "app/sequencer/live_state.h"
 #include "app/sequencer/progress.h"
+#include "app/sequencer/separation_plan.h"
 #include "rig/acquisition.h"
 
 namespace plumbline::app {
@@ -80,11 +81,28 @@ Result<ExitCode> calibrate_run(const MeasureRequest& request, storage::RunId run
   auto job = job_from_database(request.session.database, run, request.seed);
   if (!job) return fail(job.error());
   job->style = request.style;
+  if (auto added = add_own_effects(request.effects, *job); !added) return fail(added.error());
   const auto outcome = perform(*job, request.out);
   if (!outcome) return fail(outcome.error());
   fmt::print("run {} in {}\n{}\n", run, request.session.database.string(), outcome->summary);
   sentence = outcome->summary.substr(outcome->summary.rfind('\n') + 1);
   return outcome->exit_code;
+}
+
+/// What the poses so far leave open and further ones would decide.
+Result<std::vector<PlanStep>> poses_that_decide(const MeasureRequest& request, storage::RunId run) {
+  auto job = job_from_database(request.session.database, run, request.seed);
+  if (!job) return fail(job.error());
+  if (auto added = add_own_effects(request.effects, *job); !added) return fail(added.error());
+  const Calibration calibration = calibrate_job(*job);
+  auto steps = separating_steps(calibration.diagnosis, request.session.rig.plan.samples_per_pose);
+  for (const FoundEffect& effect : calibration.diagnosis.effects) {
+    if (!effect.separate_by.empty()) fmt::print(stderr, "{}: {}\n", effect.id, effect.separate_by);
+  }
+  fmt::print(stderr, "separate: {}\n",
+             steps.empty() ? std::string("no further poses are needed, or none would decide")
+                           : fmt::format("{} further poses in the same run", steps.size()));
+  return steps;
 }
 
 std::string chain_head_of(const std::filesystem::path& database, storage::RunId run) {
@@ -153,7 +171,10 @@ Result<storage::RunId> measure(const MeasureRequest& request, LiveState& live, N
   ProgressDisplay display(stderr, isatty(STDERR_FILENO) != 0);
   const auto socket = ControlSocket::open(control_path(request.session.database), live, control);
   if (!socket) return fail(socket.error());
-  const auto session = run_session(request.session, control, [&](const Progress& progress) {
+  SessionRequest whole = request.session;
+  if (request.separate)
+    whole.further = [&request](storage::RunId run) { return poses_that_decide(request, run); };
+  const auto session = run_session(whole, control, [&](const Progress& progress) {
     live.update(progress);
     notifier.update(progress);
     display.show(progress);

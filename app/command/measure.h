@@ -18,7 +18,9 @@ struct MeasureRequest {
   std::uint64_t seed = 1;  ///< of the calibration
   CertificateStyle style = {};
   NotifyOptions notify = {};
-  std::string resume_hint;  ///< the command that goes on with a run that has ended early
+  bool separate = false;               ///< measure at once what tells effects apart
+  std::filesystem::path effects = {};  ///< of the user; empty: none
+  std::string resume_hint;             ///< the command that goes on with a run that has ended early
 };
 
 /// Runs the plan alone and says which run it became. `live` and `notifier` are told about it.

@@ -10,7 +10,9 @@
 #include "app/command/command.h"
 #include "app/config/rig_description.h"
 #include "app/io/files.h"
+#include "app/io/read_file.h"
 #include "app/sequencer/plan.h"
+#include "app/sequencer/separation_plan.h"
 #include "app/sequencer/shortest_plan.h"
 
 namespace plumbline::app {
@@ -24,6 +26,7 @@ struct PlanArguments {
   std::optional<std::uint64_t> seed;
   bool print = false;
   std::string csv;
+  std::string file;
   std::optional<double> until_u_mps2;
   double pose_sd_mps2 = 0.03;
 };
@@ -55,6 +58,13 @@ Result<ExitCode> show_plan(const PlanArguments& arguments) {
   options.one_sided = options.one_sided || arguments.one_sided;
   options.seed = arguments.seed.value_or(options.seed);
   Plan plan = make_plan(rig->run.grid, options, rig->sensor.rate_hz);
+  if (!arguments.file.empty()) {
+    const auto text = read_file(arguments.file);
+    if (!text) return fail(text.error());
+    auto read = plan_from_csv(*text, arguments.file);
+    if (!read) return fail(read.error());
+    plan = *std::move(read);
+  }
   std::optional<ShortestPlan> shortest;
   if (arguments.until_u_mps2) {
     auto found = shortest_plan(plan, options, rig->run.gravity,
@@ -79,10 +89,13 @@ Result<ExitCode> show_plan(const PlanArguments& arguments) {
       time_plan(plan, {rig->head.speed_deg_s, rig->head.acceleration_deg_s2}, rig->sensor.rate_hz,
                 shortest_settling_s(rig->settling, rig->sensor.rate_hz));
   fmt::print(
-      "{} steps, {} order{}: about {} (moving {:.1f} s, sampling {:.1f} s, settling {:.1f} s)\n"
+      "{} steps, {}{}: about {} (moving {:.1f} s, sampling {:.1f} s, settling {:.1f} s)\n"
       "soft limits: {}\n",
-      plan.steps.size(), to_string(options.order), options.one_sided ? ", one-sided" : "",
-      minutes(time.total_s()), time.moving_s, time.sampling_s, time.settling_s,
+      plan.steps.size(),
+      arguments.file.empty() ? to_string(options.order) + std::string(" order")
+                             : "from " + arguments.file,
+      arguments.file.empty() && options.one_sided ? ", one-sided" : "", minutes(time.total_s()),
+      time.moving_s, time.sampling_s, time.settling_s,
       rig->soft_limits ? "kept" : "not in the configuration; the drive's own are checked by run");
   return ExitCode::done;
 }
@@ -98,6 +111,7 @@ void add_plan(CLI::App& program, Invocation& invocation) {
       ->check(CLI::IsMember(visit_order_names()));
   sub->add_flag("--one-sided", arguments->one_sided, "approach every position in +delta direction");
   sub->add_option("--seed", arguments->seed, "of random order and verification angles");
+  sub->add_option("--plan", arguments->file, "these steps (CSV) instead of [grid] and [plan]");
   sub->add_flag("--print", arguments->print, "print every step as CSV");
   sub->add_option("--csv", arguments->csv, "write the steps into this file");
   sub->add_option("--until-u", arguments->until_u_mps2,

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "app/command/certificate_options.h"
@@ -11,6 +12,8 @@
 #include "app/command/station_options.h"
 #include "app/config/rig_description.h"
 #include "app/io/output_folder.h"
+#include "app/io/read_file.h"
+#include "app/sequencer/separation_plan.h"
 
 namespace plumbline::app {
 
@@ -27,6 +30,9 @@ struct RunArguments {
   bool no_journal = false;
   std::string operator_name;
   ServeOptions serve;
+  std::string plan;
+  std::string effects;
+  bool separate = false;
 };
 
 Result<ExitCode> run(const RunArguments& arguments) {
@@ -35,11 +41,22 @@ Result<ExitCode> run(const RunArguments& arguments) {
   const auto style = certificate_style(arguments.certificate);
   if (!style) return fail(style.error());
   if (!arguments.serial.empty()) rig->run.dut.serial = arguments.serial;
+  std::optional<Plan> plan;
+  if (!arguments.plan.empty()) {
+    const auto text = read_file(arguments.plan);
+    if (!text) return fail(text.error());
+    auto read = plan_from_csv(*text, arguments.plan);
+    if (!read) return fail(read.error());
+    plan = *std::move(read);
+  }
   // An unwritable place is refused before the hours of measuring, not after them.
   if (auto folder = OutputFolder::prepare(arguments.out); !folder) return fail(folder.error());
   const std::string hint =
-      fmt::format("plumbline run --resume --config {} --serial {} --db {} --out {}",
-                  arguments.config, rig->run.dut.serial, arguments.database, arguments.out);
+      fmt::format("plumbline run --resume --config {} --serial {} --db {} --out {}{}{}{}",
+                  arguments.config, rig->run.dut.serial, arguments.database, arguments.out,
+                  arguments.plan.empty() ? "" : " --plan " + arguments.plan,
+                  arguments.effects.empty() ? "" : " --effects " + arguments.effects,
+                  arguments.separate ? " --separate" : "");
   NotifyOptions notify = arguments.notify;
   if (notify.journal.empty() && !arguments.no_journal) notify.journal = arguments.database + ".log";
   const auto station = station_of_run(arguments.serve, arguments.database, arguments.out);
@@ -48,10 +65,13 @@ Result<ExitCode> run(const RunArguments& arguments) {
                                                  .database = arguments.database,
                                                  .out = arguments.out,
                                                  .resume = arguments.resume,
-                                                 .operator_name = arguments.operator_name},
+                                                 .operator_name = arguments.operator_name,
+                                                 .plan = plan},
                                      .out = arguments.out,
                                      .style = *style,
                                      .notify = notify,
+                                     .separate = arguments.separate,
+                                     .effects = arguments.effects,
                                      .resume_hint = hint});
   if (*station) (*station)->let_viewers_see_the_end();
   return code;
@@ -70,6 +90,14 @@ void add_run(CLI::App& program, Invocation& invocation) {
   sub->add_option("--out", arguments->out, "folder for results and certificate")->required();
   sub->add_flag("--resume", arguments->resume, "go on with the unit's last unfinished run");
   sub->add_option("--operator", arguments->operator_name, "who measures; noted with the run");
+  sub->add_option("--plan", arguments->plan,
+                  "steps to run instead of [grid] and [plan], as `plan --csv` and a calibration's "
+                  "separate.csv have them");
+  sub->add_flag("--separate", arguments->separate,
+                "measure at once, in the same run, the poses that tell effects apart where they "
+                "leave more than one explanation, and decide again");
+  sub->add_option("--effects", arguments->effects,
+                  "effects of your own, searched for like the listed ones (TOML)");
   add_certificate_options(*sub, arguments->certificate);
   add_serve_options(*sub, arguments->serve);
   sub->add_option("--summary", arguments->notify.summary, "how it ended, as JSON, into this file");

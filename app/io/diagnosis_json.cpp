@@ -7,24 +7,31 @@ namespace {
 Json json_parameters(const std::vector<EffectParameter>& reported) {
   Json parameters = Json::array();
   for (const EffectParameter& parameter : reported) {
-    parameters.push_back(
-        {{"name", parameter.name},
-         {"axis", parameter.axis ? Json(kAxisName.at(*parameter.axis)) : Json(nullptr)},
-         {"value", json_number(parameter.value)},
-         {"u", json_number(parameter.u)},
-         {"unit", parameter.unit}});
+    Json json = {{"name", parameter.name},
+                 {"axis", parameter.axis ? Json(kAxisName.at(*parameter.axis)) : Json(nullptr)},
+                 {"value", json_number(parameter.value)},
+                 {"u", json_number(parameter.u)},
+                 {"unit", parameter.unit}};
+    if (parameter.filter) {
+      json["ekf"] = {{"value", json_number(parameter.filter->value)},
+                     {"u", json_number(parameter.filter->u)},
+                     {"en", json_number(parameter.filter->en)}};
+    }
+    parameters.push_back(std::move(json));
   }
   return parameters;
 }
 
 Json to_json(const FoundEffect& effect) {
-  return {{"id", effect.id},
-          {"axes", json_axis_names(effect.axes)},
-          {"parameters", json_parameters(effect.parameters)},
-          {"p_value", json_number(effect.p_value)},
-          {"heldout_gain", json_number(effect.heldout_gain)},
-          {"alternatives", effect.alternatives},
-          {"separate_by", effect.separate_by}};
+  Json json = {{"id", effect.id},
+               {"axes", json_axis_names(effect.axes)},
+               {"parameters", json_parameters(effect.parameters)},
+               {"p_value", json_number(effect.p_value)},
+               {"heldout_gain", json_number(effect.heldout_gain)},
+               {"alternatives", effect.alternatives},
+               {"separate_by", effect.separate_by}};
+  if (!effect.definition.empty()) json["definition"] = effect.definition;
+  return json;
 }
 
 Json to_json(const UnlistedStructure& structure) {
@@ -35,6 +42,16 @@ Json to_json(const UnlistedStructure& structure) {
           {"parameters", json_parameters(structure.parameters)},
           {"p_value", json_number(structure.p_value)},
           {"heldout_gain", json_number(structure.heldout_gain)}};
+}
+
+Json to_json(const DetectionLimit& limit) {
+  return {{"id", limit.id},
+          {"axis", limit.axis ? Json(kAxisName.at(*limit.axis)) : Json(nullptr)},
+          {"parameter", limit.parameter},
+          {"limit", json_number(limit.limit)},
+          {"best", json_number(limit.best)},
+          {"worst", json_number(limit.worst)},
+          {"unit", limit.unit}};
 }
 
 }  // namespace
@@ -52,12 +69,18 @@ Json json_diagnosis(const Diagnosis& diagnosis) {
             {"dof", json_number(test.dof)},
             {"p_value", json_number(test.p_value)}};
   });
-  return {{"verdict", to_string(diagnosis.verdict)},
-          {"reason", diagnosis.reason},
-          {"p_value", json_number(diagnosis.p_value)},
-          {"residual_test", tests},
-          {"effects", std::move(effects)},
-          {"unlisted", std::move(unlisted)}};
+  Json json = {{"verdict", to_string(diagnosis.verdict)},
+               {"reason", diagnosis.reason},
+               {"p_value", json_number(diagnosis.p_value)},
+               {"residual_test", tests},
+               {"effects", std::move(effects)},
+               {"unlisted", std::move(unlisted)}};
+  if (!diagnosis.not_found.empty()) {
+    Json limits = Json::array();
+    for (const DetectionLimit& limit : diagnosis.not_found) limits.push_back(to_json(limit));
+    json["detection_limits"] = std::move(limits);
+  }
+  return json;
 }
 
 Json json_errors(const ErrorFigures& error) {

@@ -20,8 +20,11 @@ struct StoredCalibration {
   DeviceUnderTest dut;
 };
 
-/// Refused with the place in the file: another schema, a missing or wrong value.
-Result<StoredCalibration> parse_result_json(std::string_view text, const std::string& name);
-Result<StoredCalibration> read_result_json(const std::filesystem::path& path);
+/// Refused with the place in the file: another schema, a missing or wrong value. `reference_C`: of
+/// the data that it will be applied to.
+Result<StoredCalibration> parse_result_json(std::string_view text, const std::string& name,
+                                            double reference_C = 20);
+Result<StoredCalibration> read_result_json(const std::filesystem::path& path,
+                                           double reference_C = 20);
 
 }  // namespace plumbline::app

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "app/config/own_effects.h"
 #include "app/io/read_file.h"
 #include "app/io/result_json.h"
 
@@ -68,6 +69,7 @@ FoundEffect found_effect(const Json& json) {
   effect.id = json.at("id").get<std::string>();
   effect.axes = axes_named(json.at("axes"));
   effect.parameters = effect_parameters(json.at("parameters"));
+  effect.definition = json.value("definition", "");
   return effect;
 }
 
@@ -81,7 +83,7 @@ UnlistedStructure unlisted_structure(const Json& json) {
   return structure;
 }
 
-StoredCalibration stored_calibration(const Json& json) {
+StoredCalibration stored_calibration(const Json& json, double reference_C) {
   if (const auto schema = json.at("schema").get<std::string>(); schema != "plumbline.result/1") {
     throw std::invalid_argument(
         fmt::format("its schema is \"{}\" instead of \"plumbline.result/1\"", schema));
@@ -91,6 +93,11 @@ StoredCalibration stored_calibration(const Json& json) {
   stored.model.final = triad_estimate(json.at("final").at("batch_ls"));
   for (const Json& effect : json.at("diagnosis").at("effects")) {
     stored.model.effects.push_back(found_effect(effect));
+    const FoundEffect& found = stored.model.effects.back();
+    if (found.definition.empty()) continue;
+    const auto own = parse_own_effects(found.definition, found.id + ", definition", reference_C);
+    if (!own) throw std::invalid_argument(own.error().message);
+    stored.model.own_effects.insert(stored.model.own_effects.end(), own->begin(), own->end());
   }
   for (const Json& structure : json.at("diagnosis").at("unlisted")) {
     stored.model.unlisted.push_back(unlisted_structure(structure));
@@ -103,19 +110,20 @@ StoredCalibration stored_calibration(const Json& json) {
 
 }  // namespace
 
-Result<StoredCalibration> parse_result_json(std::string_view text, const std::string& name) {
+Result<StoredCalibration> parse_result_json(std::string_view text, const std::string& name,
+                                            double reference_C) {
   try {
-    return stored_calibration(Json::parse(text));
+    return stored_calibration(Json::parse(text), reference_C);
   } catch (const std::exception& error) {
     return fail(ErrorCode::input,
                 fmt::format("{}: not a usable result.json: {}", name, error.what()));
   }
 }
 
-Result<StoredCalibration> read_result_json(const std::filesystem::path& path) {
+Result<StoredCalibration> read_result_json(const std::filesystem::path& path, double reference_C) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
-  return parse_result_json(*text, path.string());
+  return parse_result_json(*text, path.string(), reference_C);
 }
 
 }  // namespace plumbline::app

@@ -86,6 +86,12 @@ Result<std::vector<PoseMean>> means_of(const storage::RunStore& store, storage::
   return means;
 }
 
+Plan plan_of(const SessionRequest& request) {
+  if (request.plan) return *request.plan;
+  const RigDescription& rig = request.rig;
+  return make_plan(rig.run.grid, rig.plan, rig.sensor.rate_hz);
+}
+
 /// What a whole run writes, events and the log of the database included, with a half to spare.
 std::uintmax_t bytes_needed(const Plan& plan, double rate_hz) {
   constexpr double kBytesPerSample = 37 + 30;  // covariates beside them
@@ -196,6 +202,107 @@ Result<Started> begin(storage::RunStore& store, const SessionRequest& request, c
   return started;
 }
 
+/// Drive and sensor, for one engine.
+struct Connections {
+  std::unique_ptr<rig::DividingHead> head;
+  std::unique_ptr<rig::Acquisition> acquisition;
+};
+
+Result<Connections> connect(const RigDescription& rig) {
+  auto head = rig::make_dividing_head(rig.head);
+  if (!head) return fail(head.error());
+  auto source = rig::make_sample_source(rig.sensor);
+  if (!source) return fail(source.error());
+  Connections connections{*std::move(head), std::make_unique<rig::Acquisition>(*std::move(source))};
+  if (auto started = connections.acquisition->start(); !started) return fail(started.error());
+  return connections;
+}
+
+EngineOptions engine_options(const RigDescription& rig) {
+  EngineOptions options;
+  options.rate_hz = rig.sensor.rate_hz;
+  options.adc = rig.sensor.adc;
+  options.motion = {rig.head.speed_deg_s, rig.head.acceleration_deg_s2};
+  options.settling = rig.settling;
+  options.recovery = rig.recovery;
+  options.suspend = rig.suspend;
+  options.home_end_latched = rig.head.home_end_latched;
+  options.node_tells_identity = rig.sensor.tells_identity;
+  options.poll_interval = rig.head.poll_interval;
+  options.watchdog = rig.head.watchdog;
+  return options;
+}
+
+/// The plan with further steps from number `first` on, behind everything that the run has stored. A
+/// step that was measured again has its number plus a multiple of the plan's length: the next free
+/// multiple is where the new ones begin, and what lies between counts as done.
+Plan lengthened(const Plan& plan, const std::vector<PlanStep>& steps, long long first,
+                const PlanOptions& options) {
+  Plan longer = plan;
+  while (std::ssize(longer.steps) < first) {
+    longer.steps.push_back(plan.steps[longer.steps.size() % plan.steps.size()]);
+    longer.steps.back().ordinal = std::ssize(longer.steps) - 1;
+  }
+  // By way of the last pose of the grid, so that they have a pose before them that is in the data.
+  rig::HeadAngles from = plan.steps.back().target;
+  for (const PlanStep& step : plan.steps)
+    if (step.kind == storage::PoseKind::grid) from = step.target;
+  for (PlanStep step : steps) {
+    step.ordinal = std::ssize(longer.steps);
+    if (step.ordinal == first) step.via.push_back(from);
+    if (options.one_sided && step.target.delta_deg < from.delta_deg)
+      step.via.push_back({step.target.delta_deg - options.approach_deg, step.target.h_deg});
+    from = step.target;
+    longer.steps.push_back(std::move(step));
+  }
+  return longer;
+}
+
+/// Goes on with a run whose plan is done.
+Result<void> run_further(const SessionRequest& request, const Plan& plan, storage::RunId run,
+                         const std::vector<PlanStep>& steps, storage::RunStore& store,
+                         const EngineControl& control, const ProgressObserver& observer) {
+  const RigDescription& rig = request.rig;
+  const auto stored = store.poses(run);
+  if (!stored) return fail(stored.error());
+  const long long length = std::ssize(plan.steps);
+  long long first = length;
+  for (const storage::PoseRecord& pose : *stored)
+    first = std::max(first, (pose.ordinal / length + 1) * length);
+  const Plan longer = lengthened(plan, steps, first, rig.plan);
+  if (rig.soft_limits) {
+    if (auto allowed = check_plan(longer, *rig.soft_limits); !allowed) return allowed;
+  }
+  StartPoint start;
+  start.resumed = true;
+  for (long long step = 0; step < first; ++step) start.committed.push_back(step);
+  auto identity = store.identity(run);
+  if (!identity) return fail(identity.error());
+  start.identity = *std::move(identity);
+  auto means = means_of(store, run, plan, rig.sensor.adc);
+  if (!means) return fail(means.error());
+  start.means = *std::move(means);
+  const auto loaded = store.load(run);
+  if (!loaded) return fail(loaded.error());
+  start.t_s = clock_of_resumption(*loaded, rig.sensor.rate_hz);
+  if (rig.settling.noise_V <= 0) {
+    start.floor = learn_noise_floor(soak_codes(loaded->soak, rig.sensor.adc, rig.sensor.rate_hz),
+                                    rig.sensor.adc, static_cast<std::size_t>(rig.settling.window),
+                                    rig.sensor.rate_hz);
+  }
+  if (auto reopened = store.finish_run(run, storage::RunState::running, ""); !reopened)
+    return reopened;
+  const auto noted =
+      store.add_event(run, {start.t_s, utc_now(), "separate",
+                            fmt::format("{} further poses to tell effects apart", steps.size())});
+  if (!noted) return noted;
+  const auto connections = connect(rig);
+  if (!connections) return fail(connections.error());
+  Engine engine(*connections->head, *connections->acquisition, store, control, engine_options(rig),
+                observer);
+  return engine.run(longer, run, start);
+}
+
 }  // namespace
 
 Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database) {
@@ -217,37 +324,35 @@ Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& d
 Result<Session> run_session(const SessionRequest& request, const EngineControl& control,
                             const ProgressObserver& observer) {
   const RigDescription& rig = request.rig;
-  const Plan plan = make_plan(rig.run.grid, rig.plan, rig.sensor.rate_hz);
+  const Plan plan = plan_of(request);
   if (rig.soft_limits) {
     if (auto allowed = check_plan(plan, *rig.soft_limits); !allowed) return fail(allowed.error());
   }
   if (auto room = check_room(request.database, bytes_needed(plan, rig.sensor.rate_hz)); !room) {
     return fail(room.error());
   }
-  auto head = rig::make_dividing_head(rig.head);
-  if (!head) return fail(head.error());
-  auto source = rig::make_sample_source(rig.sensor);
-  if (!source) return fail(source.error());
+  auto connections = connect(rig);
+  if (!connections) return fail(connections.error());
   auto store = storage::RunStore::open(request.database);
   if (!store) return fail(store.error());
-  rig::Acquisition acquisition(*std::move(source));
-  if (auto started = acquisition.start(); !started) return fail(started.error());
   auto begun = begin(*store, request, plan);
   if (!begun) return fail(begun.error());
 
-  EngineOptions options;
-  options.rate_hz = rig.sensor.rate_hz;
-  options.adc = rig.sensor.adc;
-  options.motion = {rig.head.speed_deg_s, rig.head.acceleration_deg_s2};
-  options.settling = rig.settling;
-  options.recovery = rig.recovery;
-  options.suspend = rig.suspend;
-  options.home_end_latched = rig.head.home_end_latched;
-  options.node_tells_identity = rig.sensor.tells_identity;
-  options.poll_interval = rig.head.poll_interval;
-  options.watchdog = rig.head.watchdog;
-  Engine engine(**head, acquisition, *store, control, options, observer);
-  return Session{begun->run, engine.run(plan, begun->run, begun->start)};
+  Session session{begun->run, {}};
+  {
+    Engine engine(*connections->head, *connections->acquisition, *store, control,
+                  engine_options(rig), observer);
+    session.outcome = engine.run(plan, begun->run, begun->start);
+  }
+  *connections = {};  // nothing piles up while the poses are looked at
+  if (!session.outcome || !request.further) return session;
+  auto steps = request.further(begun->run);
+  if (!steps) {
+    session.outcome = fail(steps.error());
+  } else if (!steps->empty()) {
+    session.outcome = run_further(request, plan, begun->run, *steps, *store, control, observer);
+  }
+  return session;
 }
 
 }  // namespace plumbline::app

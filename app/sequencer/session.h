@@ -2,6 +2,10 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "app/config/rig_description.h"
 #include "app/sequencer/engine.h"
@@ -16,6 +20,9 @@ struct SessionRequest {
   std::filesystem::path out = {};  ///< shares the disk; only looked at
   bool resume = false;             ///< go on with the last unfinished run of rig.run.dut.serial
   std::string operator_name = {};  ///< who measures; noted as an event unless empty
+  std::optional<Plan> plan = {};   ///< instead of the one that `rig` describes
+  /// Asked once the plan is done: grid steps, numbered from 0, that the same run goes on with.
+  std::function<Result<std::vector<PlanStep>>(storage::RunId)> further = {};
 };
 
 /// A run that has been started: how it ended, and which one it is.
@@ -29,7 +36,8 @@ struct Session {
 Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database);
 
 /// Fails before anything moves when the plan, the room on the disk, the database, the run to be
-/// resumed or the sensor bus refuses; a failure is then the whole result. A resumed run must have
+/// resumed or the sensor bus refuses; a failure is then the whole result. What goes wrong with
+/// further steps is the session's outcome. A resumed run must have
 /// the same configuration and plan, word for word (the addresses of drive and node excepted); its
 /// clock goes on by the time that has passed since its last event.
 Result<Session> run_session(const SessionRequest& request, const EngineControl& control,

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "app/sequencer/separation_plan.h"
 #include "app/sequencer/shortest_plan.h"
 
 namespace plumbline::app {
@@ -265,6 +266,34 @@ TEST(ShortestPlan, FewerPositionsThanTheOrderOfTheGrid) {
   const auto never = shortest_plan(all, options, {}, {1e-6, 0.03});
   ASSERT_FALSE(never);
   EXPECT_THAT(never.error().message, HasSubstr("all 324 positions"));
+}
+
+TEST(PlanFile, ReadsBackWhatWasWritten) {
+  PlanOptions options;
+  options.one_sided = true;
+  options.order = VisitOrder::random;
+  const Plan plan = make_plan(Grid{}, options, kRate_Hz);
+  const auto read = plan_from_csv(to_csv(plan), "plan.csv");
+  ASSERT_TRUE(read.has_value()) << read.error().message;
+  EXPECT_EQ(to_csv(*read), to_csv(plan));
+  EXPECT_EQ(read->steps.size(), plan.steps.size());
+}
+
+TEST(PlanFile, IsRefusedWithTheLine) {
+  const std::string header = "ordinal,kind,delta_deg,h_deg,samples,via\n";
+  for (const auto& [text, place] : std::vector<std::pair<std::string, std::string>>{
+           {"t_s,pose\n", "p.csv:1:"},
+           {header + "0,grid,10,20,40,\n1,gird,10,20,40,\n", "p.csv:3:"},
+           {header + "0,grid,10,nan,40,\n", "p.csv:2:"},
+           {header + "0,grid,10,20,0,\n", "p.csv:2:"},
+           {header + "0,grid,10,20,40,5\n", "p.csv:2:"},
+           {header + "1,grid,10,20,40,\n", "p.csv:2:"},
+           {header, "p.csv: holds no step"}}) {
+    const auto plan = plan_from_csv(text, "p.csv");
+    ASSERT_FALSE(plan.has_value()) << text;
+    EXPECT_EQ(plan.error().code, ErrorCode::input);
+    EXPECT_EQ(plan.error().message.find(place), 0u) << plan.error().message;
+  }
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include <string>
 #include <thread>
 
+#include "app/sequencer/separation_plan.h"
 #include "tests/app/sequencer_fixture.h"
 
 namespace plumbline::app {
@@ -106,6 +107,48 @@ TEST_F(SequencerRun, StopsOnRequestAndResumes) {
   ASSERT_FALSE(again.has_value());
   EXPECT_EQ(again.error().code, ErrorCode::input);
   EXPECT_THAT(again.error().message, HasSubstr("is finished"));
+}
+
+TEST_F(SequencerRun, GoesOnWithFurtherPosesInTheSameRun) {
+  start_rig();
+  int asked = 0;
+  SessionRequest request{.rig = rig_, .database = database()};
+  request.further = [&](storage::RunId run) -> Result<std::vector<PlanStep>> {
+    ++asked;
+    EXPECT_EQ(run, 1);
+    EXPECT_EQ(stored().grid.poses.size(), 12u);  // what was measured can be looked at
+    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20},
+                                 {1, storage::PoseKind::grid, {135, -10}, {}, 40}};
+  };
+  const auto session = run_session(request, control_, {});
+  ASSERT_TRUE(session.has_value()) << session.error().message;
+  ASSERT_TRUE(session->outcome.has_value()) << session->outcome.error().message;
+  EXPECT_EQ(asked, 1);
+  const storage::StoredRun run = stored();
+  EXPECT_EQ(run.summary.state, RunState::finished);
+  ASSERT_EQ(run.grid.poses.size(), 14u);
+  EXPECT_EQ(run.verification.poses.size(), 2u);
+  EXPECT_EQ(run.grid.poses[12].delta_deg, 45);
+  EXPECT_EQ(run.grid.poses[13].h_deg, -10);
+  EXPECT_EQ(run.grid.poses[13].count, 40u);
+  for (std::size_t i = 1; i < run.grid.samples.size(); ++i)
+    ASSERT_GT(run.grid.samples.t_s[i], run.grid.samples.t_s[i - 1]);
+  EXPECT_THAT(events("separate"), testing::ElementsAre(HasSubstr("2 further poses")));
+  expect_motors_at_rest();
+}
+
+TEST_F(SequencerRun, RunsAPlanFromAFile) {
+  start_rig();
+  const auto plan = plan_from_csv(
+      "ordinal,kind,delta_deg,h_deg,samples,via\n0,grid,10,5,20,\n1,grid,20,5,20,15:5\n", "p.csv");
+  ASSERT_TRUE(plan.has_value()) << plan.error().message;
+  rig_.settling.noise_V = 3e-4;  // no soak to learn it from
+  const auto session =
+      run_session({.rig = rig_, .database = database(), .plan = *plan}, control_, {});
+  ASSERT_TRUE(session.has_value()) << session.error().message;
+  ASSERT_TRUE(session->outcome.has_value()) << session->outcome.error().message;
+  EXPECT_EQ(stored().grid.poses.size(), 2u);
+  EXPECT_EQ(stored().summary.header.plan_csv, to_csv(*plan));
 }
 
 TEST_F(SequencerRun, RefusesToResumeAnotherPlan) {
