@@ -201,13 +201,20 @@ void attach_filter(Diagnosed& diagnosed, const Eigen::VectorXd& value, const Eig
     }
     // As report_parameters() lists them.
     const auto infos = effect.parameters();
+    std::vector<double> values = active.p, own_u(active.p.size(), 0);
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!active.free[k]) continue;
+      values[k] = value(row);
+      own_u[k] = u(row++);
+    }
+    effect.normalise(values);
     for (std::size_t k = 0; k < infos.size(); ++k) {
       if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
       EffectParameter& parameter = reported->at((*at)++);
       if (!active.free[k]) continue;
-      const double difference = std::abs(value(row) - active.p[k]);
-      parameter.filter = {value(row), u(row), difference / (2 * std::hypot(u(row), parameter.u))};
-      ++row;
+      const double difference = std::abs(values[k] - parameter.value);
+      parameter.filter = {values[k], own_u[k],
+                          difference / (2 * std::hypot(own_u[k], parameter.u))};
     }
   }
 }
