@@ -208,7 +208,7 @@ struct Connections {
   std::unique_ptr<rig::Acquisition> acquisition;
 };
 
-Result<Connections> connect(const RigDescription& rig) {
+Result<Connections> connect_rig(const RigDescription& rig) {
   auto head = rig::make_dividing_head(rig.head);
   if (!head) return fail(head.error());
   auto source = rig::make_sample_source(rig.sensor);
@@ -296,7 +296,7 @@ Result<void> run_further(const SessionRequest& request, const Plan& plan, storag
       store.add_event(run, {start.t_s, utc_now(), "separate",
                             fmt::format("{} further poses to tell effects apart", steps.size())});
   if (!noted) return noted;
-  const auto connections = connect(rig);
+  const auto connections = connect_rig(rig);
   if (!connections) return fail(connections.error());
   Engine engine(*connections->head, *connections->acquisition, store, control, engine_options(rig),
                 observer);
@@ -331,7 +331,7 @@ Result<Session> run_session(const SessionRequest& request, const EngineControl& 
   if (auto room = check_room(request.database, bytes_needed(plan, rig.sensor.rate_hz)); !room) {
     return fail(room.error());
   }
-  auto connections = connect(rig);
+  auto connections = connect_rig(rig);
   if (!connections) return fail(connections.error());
   auto store = storage::RunStore::open(request.database);
   if (!store) return fail(store.error());
