@@ -87,7 +87,7 @@ std::optional<JointEstimate> joint_estimate(const ExplainInput& input, const Sea
     for (Eigen::Index k = 0; k < n; ++k)
       readings.variance_V2[axis](k) =
           own_variance_V2(input, found, axis, static_cast<std::size_t>(k));
-    const Eigen::Index contrasts = within_dwell ? kDwellContrasts : 0;
+    const Eigen::Index contrasts = within_dwell ? search.log.dwell_contrasts() : 0;
     readings.dwell_V[axis] = found.observed.dwell_V[axis].leftCols(contrasts);
     readings.dwell_sd_V[axis] = found.whitening.dwell_sd_V[axis].head(contrasts);
   }

@@ -32,7 +32,6 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
   const double cycle_s = std::max((log.last_s() - log.first_s()) / std::max(n - 1, 1.0), dwell_s);
   const auto count =
       static_cast<std::size_t>(std::lround(static_cast<double>(first.count) * samples_factor));
-  if (!longer.contrasts.contains(count)) longer.contrasts.emplace(count, dwell_contrasts(count));
   for (const Stop& stop : stops) {
     const Visit before = longer.visits.back();
     Visit visit = before;
@@ -48,6 +47,8 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
     const double turn[] = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
     for (std::size_t way = 0; way < visit.delta_direction.size(); ++way)
       if (std::abs(turn[way]) > 1e-9) visit.delta_direction[way] = turn[way] > 0 ? 1 : -1;
+    if (!longer.contrasts.contains(count))
+      longer.contrasts.emplace(count, contrasts_of(visit, log.line));
     longer.visits.push_back(std::move(visit));
   }
   return longer;
@@ -58,7 +59,7 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
 class NewRows {
  public:
   NewRows(const PoseWhitening& whitening, Index first, double samples_factor, bool within_dwell)
-      : first_(first), contrasts_(within_dwell ? kDwellContrasts : 0) {
+      : first_(first), contrasts_(within_dwell ? whitening.dwell_sd_V[0].size() : 0) {
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       // What a pose has for itself once the slow noise is known from its neighbours.
       std::vector<double> own(static_cast<std::size_t>(whitening.lower[i].rows()));
@@ -157,7 +158,8 @@ class Design {
       for (Index i = 0; i < 3; ++i) {
         const auto axis = static_cast<std::size_t>(i);
         difference.segment(i * n, n) = found_V[axis] - rival_V[axis];
-        difference.segment((3 + i * kDwellContrasts) * n, kDwellContrasts * n) =
+        const Index contrasts = log_.dwell_contrasts();
+        difference.segment((3 + i * contrasts) * n, contrasts * n) =
             (found_dwell_V[axis] - rival_dwell_V[axis]).reshaped();
       }
       difference = result.whitening.apply(difference);

@@ -67,6 +67,26 @@ double input_scatter_V(const MeasurementSet& set, const VisitLog& log, std::size
   return sd_before_rounding_V(lsb_V, quiet_scatter_V(set, axis));
 }
 
+}  // namespace
+
+Eigen::MatrixXd step_contrasts(std::size_t samples) {
+  constexpr int kSteps = 5;
+  const auto n = static_cast<Eigen::Index>(samples);
+  Eigen::MatrixXd contrasts = Eigen::MatrixXd::Zero(n, kSteps);
+  Eigen::Index used = 0, edge = 0;
+  for (int halvings = kSteps; halvings > 0; --halvings) {
+    const Eigen::Index next = n >> halvings;
+    if (next <= edge) continue;
+    edge = next;
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
+    step.head(edge).setOnes();
+    step.array() -= step.mean();
+    for (Eigen::Index k = 0; k < used; ++k) step -= contrasts.col(k).dot(step) * contrasts.col(k);
+    contrasts.col(used++) = step.normalized();
+  }
+  return contrasts;
+}
+
 Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<DwellLine>>& lines) {
   Eigen::MatrixXd contrasts = step_contrasts(visit.count);
   for (const auto& line : lines) {
@@ -85,26 +105,6 @@ Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<Dwe
       contrasts.rightCols<1>() =
           resolved ? column.normalized().eval() : Eigen::VectorXd::Zero(contrasts.rows()).eval();
     }
-  }
-  return contrasts;
-}
-
-}  // namespace
-
-Eigen::MatrixXd step_contrasts(std::size_t samples) {
-  constexpr int kSteps = 5;
-  const auto n = static_cast<Eigen::Index>(samples);
-  Eigen::MatrixXd contrasts = Eigen::MatrixXd::Zero(n, kSteps);
-  Eigen::Index used = 0, edge = 0;
-  for (int halvings = kSteps; halvings > 0; --halvings) {
-    const Eigen::Index next = n >> halvings;
-    if (next <= edge) continue;
-    edge = next;
-    Eigen::VectorXd step = Eigen::VectorXd::Zero(n);
-    step.head(edge).setOnes();
-    step.array() -= step.mean();
-    for (Eigen::Index k = 0; k < used; ++k) step -= contrasts.col(k).dot(step) * contrasts.col(k);
-    contrasts.col(used++) = step.normalized();
   }
   return contrasts;
 }

@@ -69,6 +69,9 @@ struct VisitLog {
 /// a move are fastest; columns that a short dwell cannot resolve are zero.
 Eigen::MatrixXd step_contrasts(std::size_t samples);
 
+/// The contrasts of a visit's dwell: VisitLog::contrasts says which.
+Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<DwellLine>>& lines);
+
 /// Without angles those of the visits are zero. Precondition: every pose has a sample.
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description);
 
