@@ -104,6 +104,24 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
   return stage;
 }
 
+namespace {
+
+bool is_slow_in_order(const VisitLog& log) {
+  constexpr double kSlow = 0.05;  // mean squared change from visit to visit, of twice the variance
+  double sum = 0, squares = 0, changes = 0, before = 0;
+  for (const Visit& visit : log.visits) {
+    const double height = std::sin(visit.h_rad);
+    sum += height;
+    squares += height * height;
+    if (&visit != &log.visits.front()) changes += (height - before) * (height - before);
+    before = height;
+  }
+  const auto n = static_cast<double>(log.visits.size());
+  return changes < kSlow * 2 * (squares - sum * sum / n);
+}
+
+}  // namespace
+
 Eigen::MatrixXd slow_functions(const VisitLog& log) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   Eigen::MatrixXd functions(n, 0);
@@ -122,6 +140,10 @@ Eigen::MatrixXd slow_functions(const VisitLog& log) {
   if (log.has_temperature) add([](const Visit& visit) { return visit.temperature_K; });
   for (std::size_t c = 0; c < log.covariate_names.size(); ++c)
     add([c](const Visit& visit) { return visit.covariate[c]; });
+  // Where one ring is visited after the other, the height of the spindle is slow, too.
+  if (!is_slow_in_order(log)) return functions;
+  for (const double power : {2.0, 3.0})
+    add([power](const Visit& visit) { return std::pow(std::sin(visit.h_rad), power); });
   return functions;
 }
 

@@ -28,7 +28,8 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
              const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before);
 
-/// What changes slowly and could pass for slow noise: the time to the second order and what was
+/// What changes slowly and could pass for slow noise: the time to the second order, powers of the
+/// height of the spindle where the order of the poses makes that slow, and what was
 /// recorded; n × any number, each centred and of unit length.
 Eigen::MatrixXd slow_functions(const VisitLog& log);
 

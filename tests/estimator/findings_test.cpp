@@ -128,7 +128,7 @@ TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
   for (const Pose& pose : data.run.poses) {
     const double a_z = std::sin(pose.h_deg * std::numbers::pi / 180);
     for (std::size_t i = pose.first; i < pose.first + pose.count; ++i)
-      data.run.samples.u_V[2][i] += 0.08 * -0.0328 * a_z * a_z;
+      data.run.samples.u_V[2][i] += 0.03 * -0.0328 * a_z * a_z;
   }
   const Calibration result = calibrated(data);
   ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
