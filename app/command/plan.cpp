@@ -10,7 +10,6 @@
 #include "app/command/command.h"
 #include "app/config/rig_description.h"
 #include "app/io/files.h"
-#include "app/io/read_file.h"
 #include "app/sequencer/plan.h"
 #include "app/sequencer/separation_plan.h"
 #include "app/sequencer/shortest_plan.h"
@@ -59,9 +58,7 @@ Result<ExitCode> show_plan(const PlanArguments& arguments) {
   options.seed = arguments.seed.value_or(options.seed);
   Plan plan = make_plan(rig->run.grid, options, rig->sensor.rate_hz);
   if (!arguments.file.empty()) {
-    const auto text = read_file(arguments.file);
-    if (!text) return fail(text.error());
-    auto read = plan_from_csv(*text, arguments.file);
+    auto read = read_plan_file(arguments.file);
     if (!read) return fail(read.error());
     plan = *std::move(read);
   }

@@ -12,7 +12,6 @@
 #include "app/command/station_options.h"
 #include "app/config/rig_description.h"
 #include "app/io/output_folder.h"
-#include "app/io/read_file.h"
 #include "app/sequencer/separation_plan.h"
 
 namespace plumbline::app {
@@ -43,9 +42,7 @@ Result<ExitCode> run(const RunArguments& arguments) {
   if (!arguments.serial.empty()) rig->run.dut.serial = arguments.serial;
   std::optional<Plan> plan;
   if (!arguments.plan.empty()) {
-    const auto text = read_file(arguments.plan);
-    if (!text) return fail(text.error());
-    auto read = plan_from_csv(*text, arguments.plan);
+    auto read = read_plan_file(arguments.plan);
     if (!read) return fail(read.error());
     plan = *std::move(read);
   }

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "app/calibration_job.h"
+#include "app/io/read_file.h"
 
 namespace plumbline::app {
 
@@ -145,6 +146,12 @@ Result<Plan> plan_from_csv(std::string_view text, const std::string& name) {
   }
   if (plan.steps.empty()) return fail(ErrorCode::input, name + ": holds no step");
   return plan;
+}
+
+Result<Plan> read_plan_file(const std::filesystem::path& path) {
+  const auto text = read_file(path);
+  if (!text) return fail(text.error());
+  return plan_from_csv(*text, path.string());
 }
 
 }  // namespace plumbline::app

@@ -1,6 +1,8 @@
 // From poses that would tell effects apart to steps of the sequencer.
 #pragma once
 
+#include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -24,5 +26,6 @@ Plan separation_plan(const CalibrationJob& job, const Diagnosis& diagnosis);
 
 /// What to_csv() has written. Refused with file and line. ErrorCode::input.
 Result<Plan> plan_from_csv(std::string_view text, const std::string& name);
+Result<Plan> read_plan_file(const std::filesystem::path& path);
 
 }  // namespace plumbline::app

@@ -20,7 +20,11 @@ namespace {
 struct Started {
   storage::RunId run = 0;
   StartPoint start;
+  bool plan_is_done = false;  ///< only further poses are open
 };
+
+/// The event with which further poses begin.
+constexpr const char* kFurther = "separate";
 
 storage::RunHeader header_of(const RigDescription& rig, const Plan& plan) {
   return {.serial = rig.run.dut.serial,
@@ -81,9 +85,43 @@ Result<std::vector<PoseMean>> means_of(const storage::RunStore& store, storage::
   std::vector<PoseMean> means;
   for (const storage::PoseRecord& pose : *poses) {
     if (pose.kind == storage::PoseKind::soak) continue;
-    means.push_back(mean_of(pose, step_of(pose.ordinal, plan.steps.size()), adc));
+    const long long number = step_of(pose.ordinal, plan.steps.size());
+    // A further pose has the number of a step, too, but stands elsewhere.
+    const PlanStep& step = plan.steps[static_cast<std::size_t>(number)];
+    if (step.target.delta_deg != pose.delta_deg || step.target.h_deg != pose.h_deg) continue;
+    means.push_back(mean_of(pose, number, adc));
   }
   return means;
+}
+
+/// What a run that holds something already goes on from, but for the steps that are done.
+Result<StartPoint> start_after(const storage::RunStore& store, storage::RunId run, const Plan& plan,
+                               const RigDescription& rig) {
+  StartPoint start;
+  start.resumed = true;
+  auto identity = store.identity(run);
+  if (!identity) return fail(identity.error());
+  start.identity = *std::move(identity);
+  auto means = means_of(store, run, plan, rig.sensor.adc);
+  if (!means) return fail(means.error());
+  start.means = *std::move(means);
+  const auto stored = store.load(run);
+  if (!stored) return fail(stored.error());
+  start.t_s = clock_of_resumption(*stored, rig.sensor.rate_hz);
+  if (rig.settling.noise_V <= 0) {
+    start.floor = learn_noise_floor(soak_codes(stored->soak, rig.sensor.adc, rig.sensor.rate_hz),
+                                    rig.sensor.adc, static_cast<std::size_t>(rig.settling.window),
+                                    rig.sensor.rate_hz);
+  }
+  return start;
+}
+
+/// Further poses are begun only when the plan is done: from then on nothing of it is open.
+Result<bool> further_poses_begun(const storage::RunStore& store, storage::RunId run) {
+  const auto events = store.events(run);
+  if (!events) return fail(events.error());
+  return std::any_of(events->begin(), events->end(),
+                     [](const storage::EventRecord& event) { return event.kind == kFurther; });
 }
 
 Plan plan_of(const SessionRequest& request) {
@@ -132,7 +170,12 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
   if (last == nullptr) {
     return refuse(fmt::format("holds no run of {} to resume", rig.run.dut.serial));
   }
-  if (last->state == storage::RunState::finished) {
+  const auto further_begun = further_poses_begun(store, last->id);
+  if (!further_begun) return fail(further_begun.error());
+  const bool plan_is_done = *further_begun || last->state == storage::RunState::finished;
+  // Ended between the plan and the further poses, it is open to whoever asks for those.
+  const bool may_go_further = request.further && !*further_begun;
+  if (last->state == storage::RunState::finished && !may_go_further) {
     return refuse(
         fmt::format("run {}, the last one of {}, is finished; start a new one without "
                     "--resume",
@@ -150,35 +193,23 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
                     "one, or start a new run without --resume",
                     last->id));
   }
-  Started found{last->id, {}};
+  auto start = start_after(store, last->id, plan, rig);
+  if (!start) return fail(start.error());
+  Started found{last->id, *std::move(start), plan_is_done};
   auto committed = store.committed_poses(last->id);
   if (!committed) return fail(committed.error());
-  found.start.resumed = true;
   found.start.committed = *std::move(committed);
   auto suspects = store.suspect_poses(last->id);
   if (!suspects) return fail(suspects.error());
   found.start.suspects = *std::move(suspects);
-  auto identity = store.identity(last->id);
-  if (!identity) return fail(identity.error());
-  found.start.identity = *std::move(identity);
-  auto means = means_of(store, last->id, plan, rig.sensor.adc);
-  if (!means) return fail(means.error());
-  found.start.means = *std::move(means);
-  const auto stored = store.load(last->id);
-  if (!stored) return fail(stored.error());
-  found.start.t_s = clock_of_resumption(*stored, rig.sensor.rate_hz);
-  if (rig.settling.noise_V <= 0) {
-    found.start.floor = learn_noise_floor(
-        soak_codes(stored->soak, rig.sensor.adc, rig.sensor.rate_hz), rig.sensor.adc,
-        static_cast<std::size_t>(rig.settling.window), rig.sensor.rate_hz);
-  }
   if (auto reopened = store.finish_run(last->id, storage::RunState::running, ""); !reopened) {
     return fail(reopened.error());
   }
   const auto noted = store.add_event(
-      last->id,
-      {found.start.t_s, utc_now(), "resume",
-       fmt::format("{} of {} steps are stored", found.start.committed.size(), plan.steps.size())});
+      last->id, {found.start.t_s, utc_now(), "resume",
+                 plan_is_done ? fmt::format("the plan's {} steps are done", plan.steps.size())
+                              : fmt::format("{} of {} steps are stored",
+                                            found.start.committed.size(), plan.steps.size())});
   if (!noted) return fail(noted.error());
   return found;
 }
@@ -263,44 +294,32 @@ Result<void> run_further(const SessionRequest& request, const Plan& plan, storag
                          const std::vector<PlanStep>& steps, storage::RunStore& store,
                          const EngineControl& control, const ProgressObserver& observer) {
   const RigDescription& rig = request.rig;
-  const auto stored = store.poses(run);
-  if (!stored) return fail(stored.error());
+  auto taken = store.committed_poses(run);
+  if (!taken) return fail(taken.error());
+  const auto suspects = store.suspect_poses(run);
+  if (!suspects) return fail(suspects.error());
+  taken->insert(taken->end(), suspects->begin(), suspects->end());
   const long long length = std::ssize(plan.steps);
   long long first = length;
-  for (const storage::PoseRecord& pose : *stored)
-    first = std::max(first, (pose.ordinal / length + 1) * length);
+  for (const long long ordinal : *taken) first = std::max(first, (ordinal / length + 1) * length);
   const Plan longer = lengthened(plan, steps, first, rig.plan);
   if (rig.soft_limits) {
     if (auto allowed = check_plan(longer, *rig.soft_limits); !allowed) return allowed;
   }
-  StartPoint start;
-  start.resumed = true;
-  for (long long step = 0; step < first; ++step) start.committed.push_back(step);
-  auto identity = store.identity(run);
-  if (!identity) return fail(identity.error());
-  start.identity = *std::move(identity);
-  auto means = means_of(store, run, plan, rig.sensor.adc);
-  if (!means) return fail(means.error());
-  start.means = *std::move(means);
-  const auto loaded = store.load(run);
-  if (!loaded) return fail(loaded.error());
-  start.t_s = clock_of_resumption(*loaded, rig.sensor.rate_hz);
-  if (rig.settling.noise_V <= 0) {
-    start.floor = learn_noise_floor(soak_codes(loaded->soak, rig.sensor.adc, rig.sensor.rate_hz),
-                                    rig.sensor.adc, static_cast<std::size_t>(rig.settling.window),
-                                    rig.sensor.rate_hz);
-  }
+  auto start = start_after(store, run, plan, rig);
+  if (!start) return fail(start.error());
+  for (long long step = 0; step < first; ++step) start->committed.push_back(step);
   if (auto reopened = store.finish_run(run, storage::RunState::running, ""); !reopened)
     return reopened;
   const auto noted =
-      store.add_event(run, {start.t_s, utc_now(), "separate",
+      store.add_event(run, {start->t_s, utc_now(), kFurther,
                             fmt::format("{} further poses to tell effects apart", steps.size())});
   if (!noted) return noted;
   const auto connections = connect_rig(rig);
   if (!connections) return fail(connections.error());
   Engine engine(*connections->head, *connections->acquisition, store, control, engine_options(rig),
                 observer);
-  return engine.run(longer, run, start);
+  return engine.run(longer, run, *start);
 }
 
 }  // namespace
@@ -339,18 +358,26 @@ Result<Session> run_session(const SessionRequest& request, const EngineControl& 
   if (!begun) return fail(begun.error());
 
   Session session{begun->run, {}};
-  {
+  if (!begun->plan_is_done) {
     Engine engine(*connections->head, *connections->acquisition, *store, control,
                   engine_options(rig), observer);
     session.outcome = engine.run(plan, begun->run, begun->start);
   }
   *connections = {};  // nothing piles up while the poses are looked at
-  if (!session.outcome || !request.further) return session;
-  auto steps = request.further(begun->run);
-  if (!steps) {
-    session.outcome = fail(steps.error());
-  } else if (!steps->empty()) {
-    session.outcome = run_further(request, plan, begun->run, *steps, *store, control, observer);
+  if (!session.outcome) return session;
+  std::vector<PlanStep> steps;
+  if (request.further) {
+    auto asked_for = request.further(begun->run);
+    if (!asked_for) {
+      session.outcome = fail(asked_for.error());
+      return session;
+    }
+    steps = *std::move(asked_for);
+  }
+  if (!steps.empty()) {
+    session.outcome = run_further(request, plan, begun->run, steps, *store, control, observer);
+  } else if (begun->plan_is_done) {
+    session.outcome = store->finish_run(begun->run, storage::RunState::finished, utc_now());
   }
   return session;
 }

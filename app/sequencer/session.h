@@ -39,7 +39,8 @@ Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& d
 /// resumed or the sensor bus refuses; a failure is then the whole result. What goes wrong with
 /// further steps is the session's outcome. A resumed run must have
 /// the same configuration and plan, word for word (the addresses of drive and node excepted); its
-/// clock goes on by the time that has passed since its last event.
+/// clock goes on by the time that has passed since its last event. One that was interrupted among
+/// its further poses, or before them, is asked for them anew: `further` sees those it has.
 Result<Session> run_session(const SessionRequest& request, const EngineControl& control,
                             const ProgressObserver& observer);
 

@@ -136,7 +136,6 @@ Result<void> ModbusServer::open_rtu(const std::string& link) {
     return unavailable(address, fmt::format("{}: {}", terminal_name.data(), reason()));
   }
   ::cfmakeraw(&settings);
-  settings.c_cflag |= PARENB;
   ::cfsetspeed(&settings, B115200);
   ::tcsetattr(terminal_.get(), TCSANOW, &settings);
 
@@ -147,7 +146,9 @@ Result<void> ModbusServer::open_rtu(const std::string& link) {
     return unavailable(address, fmt::format("cannot make the link: {}", reason()));
   }
   link_ = link;
-  endpoint_ = address + ",115200,8E1";
+  // A pseudo terminal has no parity, and the C library refuses to set one where nothing else is to
+  // be changed, as for the client that comes after one that was killed.
+  endpoint_ = address + ",115200,8N1";
   clients_.push_back(std::move(master));
   return {};
 }

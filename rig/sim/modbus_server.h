@@ -24,7 +24,7 @@ namespace plumbline::sim {
 class ModbusServer {
  public:
   /// `address` is "tcp:ADDRESS:PORT" (port 0 takes a free one) or "rtu:LINK": a pseudo terminal,
-  /// 115200 8E1, with LINK as a symbolic link to it. Serves from now on, on a thread of its own,
+  /// 115200 8N1, with LINK as a symbolic link to it. Serves from now on, on a thread of its own,
   /// until destroyed. `machine` must live longer. Errors: ErrorCode::input for an address that
   /// cannot be read, ErrorCode::rig for one that cannot be had.
   static Result<std::unique_ptr<ModbusServer>> open(const std::string& address, int unit_id,
@@ -34,7 +34,7 @@ class ModbusServer {
   ModbusServer(const ModbusServer&) = delete;
   ModbusServer& operator=(const ModbusServer&) = delete;
 
-  /// Where a client finds it, as rig.toml wants it: "tcp:127.0.0.1:40123", "rtu:LINK,115200,8E1".
+  /// Where a client finds it, as rig.toml wants it: "tcp:127.0.0.1:40123", "rtu:LINK,115200,8N1".
   const std::string& endpoint() const { return endpoint_; }
 
  private:

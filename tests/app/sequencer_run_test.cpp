@@ -137,6 +137,79 @@ TEST_F(SequencerRun, GoesOnWithFurtherPosesInTheSameRun) {
   expect_motors_at_rest();
 }
 
+TEST_F(SequencerRun, ResumesAmongFurtherPoses) {
+  start_rig();
+  std::vector<std::size_t> seen;
+  SessionRequest request{.rig = rig_, .database = database()};
+  request.further = [&](storage::RunId) -> Result<std::vector<PlanStep>> {
+    seen.push_back(stored().grid.poses.size());
+    if (seen.back() >= 15) return std::vector<PlanStep>{};
+    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20},
+                                 {1, storage::PoseKind::grid, {135, -10}, {}, 20}};
+  };
+  int further_moves = 0;
+  const auto stopped = run_session(request, control_, [&](const Progress& progress) {
+    if (progress.state != EngineState::moving || progress.steps <= kSteps) return;
+    if (progress.step > kSteps) control_.request_stop();  // the second of the further ones
+    ++further_moves;
+  });
+  ASSERT_TRUE(stopped.has_value()) << stopped.error().message;
+  ASSERT_FALSE(stopped->outcome.has_value());
+  EXPECT_GT(further_moves, 0);
+  EXPECT_EQ(stored().grid.poses.size(), 13u);
+
+  // Nothing of the plan is measured again but the three poses that are compared.
+  request.resume = true;
+  EngineControl go_on;
+  const auto resumed = run_session(request, go_on, {});
+  ASSERT_TRUE(resumed.has_value()) << resumed.error().message;
+  ASSERT_TRUE(resumed->outcome.has_value()) << resumed->outcome.error().message;
+  const storage::StoredRun run = stored();
+  EXPECT_EQ(run.summary.state, RunState::finished);
+  ASSERT_EQ(run.grid.poses.size(), 15u);
+  EXPECT_EQ(run.verification.poses.size(), 2u);
+  EXPECT_EQ(run.grid.poses[13].delta_deg, 45);
+  EXPECT_EQ(run.grid.poses[14].h_deg, -10);
+  EXPECT_EQ(seen, (std::vector<std::size_t>{12, 13}));
+  EXPECT_THAT(events("check"), testing::Contains(HasSubstr("3 earlier poses")));
+  expect_motors_at_rest();
+
+  // It is through now, also for whoever asks for further poses.
+  EXPECT_THAT(run_session(request, go_on, {}).error().message, HasSubstr("is finished"));
+}
+
+TEST_F(SequencerRun, ResumedWithoutFurtherPosesARunAmongThemEnds) {
+  start_rig();
+  SessionRequest request{.rig = rig_, .database = database()};
+  request.further = [](storage::RunId) -> Result<std::vector<PlanStep>> {
+    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20}};
+  };
+  const auto stopped = run_session(request, control_, [&](const Progress& progress) {
+    if (progress.steps > kSteps) control_.request_stop();
+  });
+  ASSERT_TRUE(stopped.has_value()) << stopped.error().message;
+  ASSERT_FALSE(stopped->outcome.has_value());
+  EngineControl go_on;
+  const auto ended = run_session({.rig = rig_, .database = database(), .resume = true}, go_on, {});
+  ASSERT_TRUE(ended.has_value()) << ended.error().message;
+  ASSERT_TRUE(ended->outcome.has_value()) << ended->outcome.error().message;
+  expect_complete(stored());
+}
+
+TEST_F(SequencerRun, ResumesAFinishedPlanForFurtherPoses) {
+  start_rig();
+  ASSERT_TRUE(run().has_value());
+  SessionRequest request{.rig = rig_, .database = database(), .resume = true};
+  request.further = [](storage::RunId) -> Result<std::vector<PlanStep>> {
+    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20}};
+  };
+  const auto resumed = run_session(request, control_, {});
+  ASSERT_TRUE(resumed.has_value()) << resumed.error().message;
+  ASSERT_TRUE(resumed->outcome.has_value()) << resumed->outcome.error().message;
+  EXPECT_EQ(stored().grid.poses.size(), 13u);
+  EXPECT_EQ(stored().summary.state, RunState::finished);
+}
+
 TEST_F(SequencerRun, RunsAPlanFromAFile) {
   start_rig();
   const auto plan = plan_from_csv(

@@ -240,7 +240,7 @@ TEST(WireModbusAddress, EndpointsAreReal) {
   EXPECT_THAT(rig.serve_tcp(), StartsWith("tcp:127.0.0.1:"));
   EXPECT_THAT(rig.modbus->endpoint(), ::testing::Not(StartsWith("tcp:127.0.0.1:0")));
   const std::string link = rig.directory.file("tty");
-  EXPECT_EQ(rig.serve_rtu(), "rtu:" + link + ",115200,8E1");
+  EXPECT_EQ(rig.serve_rtu(), "rtu:" + link + ",115200,8N1");
   EXPECT_TRUE(std::filesystem::is_symlink(link));
   rig.modbus.reset();
   EXPECT_FALSE(std::filesystem::exists(std::filesystem::symlink_status(link)));
@@ -250,13 +250,21 @@ TEST(WireModbusAddress, LinkOfAKilledRigIsReplacedAFileIsNot) {
   WireRig rig;
   const std::string link = rig.directory.file("tty");
   std::filesystem::create_symlink("/nonexistent", link);
-  EXPECT_EQ(rig.serve_rtu(), "rtu:" + link + ",115200,8E1");
+  EXPECT_EQ(rig.serve_rtu(), "rtu:" + link + ",115200,8N1");
   const std::string file = rig.directory.file("precious");
   std::filesystem::create_directory(file);
   auto refused = ModbusServer::open("rtu:" + file, 1, rig.machine, {}, 1);
   ASSERT_FALSE(refused.has_value());
   EXPECT_EQ(refused.error().code, ErrorCode::rig);
   EXPECT_TRUE(std::filesystem::exists(file));
+}
+
+TEST(WireModbusAddress, ALineThatAKilledClientHasLeftAsItWasCanBeOpenedAgain) {
+  WireRig rig;
+  const std::string endpoint = rig.serve_rtu();
+  const ModbusClient killed(endpoint);  // has not set the line back
+  ModbusClient next(endpoint);
+  EXPECT_EQ(next.try_read(0x20, 2), 0);
 }
 
 TEST(WireModbusAddress, WhatCannotBeHadIsRefusedInOneLine) {

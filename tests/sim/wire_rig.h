@@ -40,7 +40,7 @@ inline bool eventually(const std::function<bool()>& condition, double seconds = 
   return true;
 }
 
-/// A libmodbus client at "tcp:HOST:PORT" or "rtu:DEVICE,115200,8E1".
+/// A libmodbus client at "tcp:HOST:PORT" or "rtu:DEVICE,115200,8N1".
 class ModbusClient {
  public:
   explicit ModbusClient(const std::string& endpoint, int unit = 1) {
@@ -50,7 +50,7 @@ class ModbusClient {
                                 std::stoi(endpoint.substr(colon + 1)));
     } else {
       const std::string device = endpoint.substr(4, endpoint.find(',') - 4);
-      context_ = modbus_new_rtu(device.c_str(), 115200, 'E', 8, 1);
+      context_ = modbus_new_rtu(device.c_str(), 115200, 'N', 8, 1);
     }
     modbus_set_slave(context_, unit);
     set_timeout_ms(5000);
