@@ -172,7 +172,8 @@ void add_noise(const Composer& c) {
       if (!t.present) {
         return t.upper_limit > 0 ? "< " + significant(t.upper_limit * scale, 2) : std::string("–");
       }
-      return fmt::format("{} ± {}", significant(t.value * scale, 3), significant(t.u * scale, 1));
+      const RoundedResult r = round_result(t.value * scale, t.u * scale);
+      return r.value + " ± " + r.uncertainty;
     };
     table.rows.push_back({kAxisName[i], term(noise.Q), term(noise.N), term(noise.B), term(noise.K),
                           term(noise.R),

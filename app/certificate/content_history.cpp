@@ -85,8 +85,8 @@ void add_history(const Composer& c) {
   }
   if (!table.rows.empty()) c.add(std::move(table));
   for (const auto& [kind, count] : told.further) {
-    c.add(
-        Paragraph{c.tr("{} further events of the kind “{}” are kept with the run.", count, kind)});
+    c.add(Paragraph{
+        c.tr("Further events of the kind “{}” that are kept with the run: {}.", kind, count)});
   }
   if (told.routine > 0) {
     c.add(

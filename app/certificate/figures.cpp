@@ -102,7 +102,7 @@ Figure residual_map(const FigureContext& context, const Grid& grid) {
       context.tr("Maps of the residual over spindle angle and tilt for the axes x, y and z");
   figure.width = kFigureWidth;
   const double cell_delta = span_or(grid.delta.step_deg, 10), cell_h = span_or(grid.h.step_deg, 10);
-  constexpr double kMapHeight = 136, kGap = 26, kTop = 22;
+  constexpr double kMapHeight = 100, kGap = 26, kTop = 22;
   figure.height = kTop + 3 * (kMapHeight + kGap) + 68;
   figure.draw = [context, cell_delta, cell_h, both](Canvas& canvas) {
     const Calibration& calibration = *context.calibration;

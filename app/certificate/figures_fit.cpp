@@ -66,7 +66,7 @@ Figure convergence_figure(const FigureContext& context) {
   figure.description =
       context.tr("Convergence of recursive least squares, filter and batch least squares");
   figure.width = kFigureWidth;
-  constexpr double kPanelWidth = 112, kPanelHeight = 92, kStepX = 164, kStepY = 136, kTop = 50;
+  constexpr double kPanelWidth = 112, kPanelHeight = 76, kStepX = 164, kStepY = 118, kTop = 50;
   figure.height = kTop + 3 * kStepY - 4;
   figure.draw = [context](Canvas& canvas) {
     const Calibration& calibration = *context.calibration;

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <memory>
-#include <numeric>
+#include <span>
 
 #include "app/certificate/table_columns.h"
 #include "app/figure/cairo_canvas.h"
@@ -57,9 +58,13 @@ class Flow {
   FlowedDocument run() {
     title();
     verdict();
-    for (std::size_t i = 0; i < document_.blocks.size(); ++i) {
-      const Block* next = i + 1 < document_.blocks.size() ? &document_.blocks[i + 1] : nullptr;
-      std::visit([&](const auto& block) { add(block, next); }, document_.blocks[i]);
+    const std::vector<Block>& blocks = document_.blocks;
+    for (auto it = blocks.begin(); it != blocks.end();) {
+      const auto end = std::find_if(it + 1, blocks.end(), [](const Block& block) {
+        return std::holds_alternative<Heading>(block);
+      });
+      section({it, end});
+      it = end;
     }
     colophon();
     return std::move(result_);
@@ -177,18 +182,56 @@ class Flow {
 
   // --- blocks ---
 
-  /// What must stand below a heading on the same page.
-  double first_part(const Block* block) const {
-    if (block == nullptr) return 0;
-    if (const auto* figure = std::get_if<Figure>(block)) {
-      return figure->height * kPointsPerPixel + 40;
+  /// A heading and what it is over. A figure that does not fit this page lets what comes after it
+  /// in the section go first, so that no half page stays empty.
+  void section(std::span<const Block> blocks) {
+    std::deque<const Figure*> waiting;
+    const auto place_what_fits = [&] {
+      while (!waiting.empty() && fits(4 + height_of(*waiting.front()))) {
+        add(*waiting.front());
+        waiting.pop_front();
+      }
+    };
+    for (std::size_t i = 0; i < blocks.size(); ++i) {
+      const std::span<const Block> rest = blocks.subspan(i + 1);
+      if (const auto* heading = std::get_if<Heading>(&blocks[i])) {
+        add(*heading, first_part(rest));
+      } else if (const auto* figure = std::get_if<Figure>(&blocks[i])) {
+        waiting.push_back(figure);
+        // One that is smaller goes before one that must wait.
+        if (waiting.size() > 1 && fits(4 + height_of(*figure))) {
+          waiting.pop_back();
+          add(*figure);
+        }
+      } else if (const auto* paragraph = std::get_if<Paragraph>(&blocks[i])) {
+        add(*paragraph, paragraph->text.ends_with(':') ? first_part(rest) : 0);
+      } else if (const auto* facts = std::get_if<Facts>(&blocks[i])) {
+        add(*facts);
+      } else {
+        add(std::get<Table>(blocks[i]));
+      }
+      place_what_fits();
     }
-    return std::holds_alternative<Table>(*block) ? 80 : 36;
+    for (const Figure* figure : waiting) add(*figure);
   }
 
-  void add(const Heading& heading, const Block* next) {
+  /// What must stand on the same page below a heading: a part of whatever may come first.
+  double first_part(std::span<const Block> rest) const {
+    double least = bottom() - paper::kTop;
+    for (const Block& block : rest) {
+      if (const auto* figure = std::get_if<Figure>(&block)) {
+        least = std::min(least, 4 + height_of(*figure));
+        continue;
+      }
+      const auto* table = std::get_if<Table>(&block);
+      return std::min(least, table == nullptr ? 36 : 3 + least_part(lay_out(*table)));
+    }
+    return rest.empty() ? 0 : least;
+  }
+
+  void add(const Heading& heading, double part_below) {
     space(12);
-    need(26 + first_part(next));
+    need(26 + part_below);
     result_.outline.push_back({heading.text, result_.pages.size() - 1, y_});
     draw_lines(set(heading.text, {.size = 12.5, .bold = true, .width = paper::kTextWidth}),
                paper::kLeft, 12.5, kInk);
@@ -196,19 +239,19 @@ class Flow {
     y_ += 7;
   }
 
-  void add(const Paragraph& paragraph, const Block*) {
+  void add(const Paragraph& paragraph, double part_below) {
     const bool warning = paragraph.tone == Tone::warning;
     const double indent = warning ? 10 : 0;
     const double size = paragraph.tone == Tone::note ? 8.6 : kBodySize;
     const auto text = set(paragraph.text, {.size = size, .width = paper::kTextWidth - indent});
-    if (line_count(text) <= 4) need(height_of(text, size));
     const double height = height_of(text, size);
+    if (line_count(text) <= 4) need(height + part_below);
     if (warning && fits(height)) draw(bar(paper::kLeft, y_, 3, height, kWarningMark));
     draw_lines(text, paper::kLeft + indent, size, paragraph.tone == Tone::note ? kSoftInk : kInk);
     y_ += 5;
   }
 
-  void add(const Facts& facts, const Block*) {
+  void add(const Facts& facts) {
     constexpr double kLabel = 142, kGap = 10;
     for (const auto& [label, value] : facts.rows) {
       const auto left = set(label, {.size = kBodySize, .width = kLabel});
@@ -280,48 +323,85 @@ class Flow {
     y_ += 2 * kRowPad;
   }
 
-  void add(const Table& table, const Block*) {
+  struct LaidOut {
+    std::vector<double> widths;
+    SharedLayout caption;
+    Row header;
+    std::vector<Row> rows;
+    /// Height from each row to the next one that says what it is about: such rows stay together.
+    std::vector<double> group;
+    double head = 0;  ///< height of caption and header
+    double all = 0;
+  };
+
+  LaidOut lay_out(const Table& table) const {
     const auto text_width = [&](const std::string& text, bool bold) {
       return typeface_.width(text, {.size = kTableSize, .bold = bold}) + 2 * kCellPad + 0.5;
     };
-    const std::vector<double> widths = column_widths(table, paper::kTextWidth, text_width);
-    const Row header = set_row(table, table.header, widths, true);
-    const auto caption = set(table.caption, {.size = 9, .bold = true, .width = paper::kTextWidth});
-    std::vector<Row> rows;
-    rows.reserve(table.rows.size());
-    for (const auto& cells : table.rows) rows.push_back(set_row(table, cells, widths, false));
+    LaidOut out;
+    out.widths = column_widths(table, paper::kTextWidth, text_width);
+    out.caption = set(table.caption, {.size = 9, .bold = true, .width = paper::kTextWidth});
+    out.header = set_row(table, table.header, out.widths, true);
+    out.head = out.all = height_of(out.caption, 9) + 3 + out.header.height;
+    for (const auto& cells : table.rows) {
+      out.rows.push_back(set_row(table, cells, out.widths, false));
+      out.all += out.rows.back().height;
+    }
+    out.group.resize(out.rows.size());
+    for (std::size_t i = out.rows.size(); i-- > 0;) {
+      const bool goes_on = i + 1 < out.rows.size() && table.rows[i + 1].front().empty();
+      out.group[i] = out.rows[i].height + (goes_on ? out.group[i + 1] : 0);
+    }
+    return out;
+  }
 
-    const double head = height_of(caption, 9) + 3 + header.height;
-    const double all = std::accumulate(rows.begin(), rows.end(), head,
-                                       [](double sum, const Row& r) { return sum + r.height; });
-    // A table that fits a page stays whole, unless that would leave much of this page empty.
+  /// What of a table must stand together on its first page: a small one whole.
+  static double least_part(const LaidOut& table) {
+    constexpr double kSmall = 150, kPart = 60;
+    if (table.all <= kSmall || table.group.empty()) return table.all;
+    return table.head + std::max(table.group.front(), kPart);
+  }
+
+  void add(const Table& given) {
+    const LaidOut table = lay_out(given);
     space(3);
-    if (all <= 260) need(all);
-    need(head + (rows.empty() ? 0 : std::min(rows.front().height, 60.0)));
-    draw_lines(caption, paper::kLeft, 9, kInk);
+    need(least_part(table));
+    draw_lines(table.caption, paper::kLeft, 9, kInk);
     y_ += 3;
     const auto draw_head = [&] {
-      draw_row(header, widths);
+      draw_row(table.header, table.widths);
       draw(horizontal_rule(paper::kLeft, paper::kWidth - paper::kRight, y_, 1, kInk));
     };
     draw_head();
-    for (const Row& row : rows) {
-      if (!fits(row.height) && row.height <= bottom() - paper::kTop - header.height) {
+    const double room = bottom() - paper::kTop - table.header.height;
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+      const bool begins = i == 0 || table.group[i - 1] == table.rows[i - 1].height;
+      const double together =
+          begins && table.group[i] <= room ? table.group[i] : table.rows[i].height;
+      if (!fits(together) && together <= room) {
         new_page();
         draw_head();
       }
-      draw_row(row, widths);
+      draw_row(table.rows[i], table.widths);
       draw(horizontal_rule(paper::kLeft, paper::kWidth - paper::kRight, y_, 0.5, kRule));
     }
     y_ += 9;
   }
 
-  void add(const Figure& figure, const Block*) {
-    const double scale = std::min(kPointsPerPixel, paper::kTextWidth / figure.width);
-    const double height = figure.height * scale;
-    const auto caption = set(figure.caption, {.size = kCaptionSize, .width = paper::kTextWidth});
+  static double scale_of(const Figure& figure) {
+    return std::min(kPointsPerPixel, paper::kTextWidth / figure.width);
+  }
+  SharedLayout caption_of(const Figure& figure) const {
+    return set(figure.caption, {.size = kCaptionSize, .width = paper::kTextWidth});
+  }
+  double height_of(const Figure& figure) const {
+    return figure.height * scale_of(figure) + 4 + height_of(caption_of(figure), kCaptionSize);
+  }
+
+  void add(const Figure& figure) {
+    const double scale = scale_of(figure);
     space(4);
-    need(height + 4 + height_of(caption, kCaptionSize));
+    need(height_of(figure));
     const double top = y_;
     draw([top, scale, draw_figure = figure.draw, typeface = &typeface_](cairo_t* cairo) {
       cairo_save(cairo);
@@ -331,8 +411,8 @@ class Flow {
       draw_figure(canvas);
       cairo_restore(cairo);
     });
-    y_ += height + 4;
-    draw_lines(caption, paper::kLeft, kCaptionSize, kSoftInk);
+    y_ += figure.height * scale + 4;
+    draw_lines(caption_of(figure), paper::kLeft, kCaptionSize, kSoftInk);
     y_ += 8;
   }
 

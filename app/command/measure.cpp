@@ -101,7 +101,8 @@ Result<std::vector<PlanStep>> poses_that_decide(const MeasureRequest& request, s
   }
   fmt::print(stderr, "separate: {}\n",
              steps.empty() ? std::string("no further poses are needed, or none would decide")
-                           : fmt::format("{} further poses in the same run", steps.size()));
+                           : fmt::format("{} further {} in the same run", steps.size(),
+                                         steps.size() == 1 ? "pose" : "poses"));
   return steps;
 }
 

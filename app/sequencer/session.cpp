@@ -313,7 +313,8 @@ Result<void> run_further(const SessionRequest& request, const Plan& plan, storag
     return reopened;
   const auto noted =
       store.add_event(run, {start->t_s, utc_now(), kFurther,
-                            fmt::format("{} further poses to tell effects apart", steps.size())});
+                            fmt::format("{} further {} to tell effects apart", steps.size(),
+                                        steps.size() == 1 ? "pose" : "poses")});
   if (!noted) return noted;
   const auto connections = connect_rig(rig);
   if (!connections) return fail(connections.error());

@@ -428,9 +428,11 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
     const auto [low, high] =
         std::minmax_element(proposal.stops.begin(), proposal.stops.end(),
                             [](const Stop& a, const Stop& b) { return a.h_deg < b.h_deg; });
-    separation.words = format("%.0f further poses ", static_cast<double>(proposal.stops.size())) +
+    const bool one = proposal.stops.size() == 1;
+    separation.words = format(one ? "%.0f further pose " : "%.0f further poses ",
+                              static_cast<double>(proposal.stops.size())) +
                        proposal.how + format(" (h from %.0f° to %.0f°)", low->h_deg, high->h_deg) +
-                       condition + " tell it from " + joined(decided) +
+                       condition + (one ? " tells it from " : " tell it from ") + joined(decided) +
                        format(" by %.1f standard deviations", std::sqrt(least));
     separation.plan = {proposal.stops, proposal.samples_factor, std::sqrt(least)};
   }

@@ -164,7 +164,7 @@ TEST(Certificate, TellsWhatWasOutOfTheOrdinaryAndCountsTheRest) {
   EXPECT_THAT(html, HasSubstr("Not listed: 1047 changes of state"));
   EXPECT_THAT(html, HasSubstr("retried pose 110"));
   EXPECT_THAT(html, Not(HasSubstr("retried pose 120")));
-  EXPECT_THAT(html, HasSubstr("23 further events of the kind “retry”"));
+  EXPECT_THAT(html, HasSubstr("Further events of the kind “retry” that are kept with the run: 23."));
 }
 
 TEST(Certificate, WhatWasLookedForAndNotFound) {
@@ -219,6 +219,14 @@ TEST(Certificate, UkrainianForWhatTheCoreSays) {
   EXPECT_EQ(uk.phrase("17 poses are too few to tell an effect from noise; at least 24 are needed"),
             "положень (17) замало, щоб відрізнити ефект від шуму; потрібно щонайменше 24");
   EXPECT_EQ(uk.phrase("something new"), "something new");
+  EXPECT_EQ(uk.phrase("1 further pose in random order (h from 10° to 10°) tells it from "
+                      "rig.backlash by 7.1 standard deviations"),
+            "ще одне положення у випадковому порядку (h від 10° до 10°) відрізнить його від "
+            "rig.backlash на 7.1 стандартних відхилень");
+  EXPECT_EQ(uk.phrase("3 further poses in random order (h from 10° to 40°) tell it from "
+                      "rig.backlash by 7.1 standard deviations"),
+            "подальші положення у випадковому порядку (кількість 3, h від 10° до 40°) відрізнять "
+            "його від rig.backlash на 7.1 стандартних відхилень");
 }
 
 // What the core says and the catalogue repeats: whoever changes one, changes the other.
