@@ -39,6 +39,8 @@ class Drive {
   void check_watchdog(double t_s, HostTime now);
   /// Any request keeps the watchdog quiet and moves the heartbeat on.
   void note_request(HostTime now);
+  /// The epoch before the first one.
+  HostTime last_request() const { return last_request_; }
 
   static Refusal check_read(int address, int count);
   static Refusal check_write(int address, std::span<const std::uint16_t> words);

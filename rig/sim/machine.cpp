@@ -13,6 +13,13 @@ constexpr double kLongestStep_s = 0.05;
 /// A reply that overtakes it vouches for a position that the samples after it do not have.
 constexpr std::chrono::seconds kLongestHold{30};
 
+// A master that has polled and is not heard for a moment has no time to look, or waits for a reply
+// that a fault keeps from it. A world at 100x would be elsewhere when it looks again, so an
+// accelerated one waits for it; a master that is silent for longer has gone.
+constexpr std::chrono::milliseconds kMasterIsBusy{50};
+constexpr std::chrono::seconds kMasterHasGone{2};
+constexpr double kPaceForABusyMaster = 0.1;
+
 }  // namespace
 
 double Machine::now_s() {
@@ -21,10 +28,16 @@ double Machine::now_s() {
 }
 
 double Machine::catch_up() {
-  const double longest_s = kLongestStep_s * clock_.speed();
   const double clock_s = clock_.now_s();
+  const double passed_s = clock_s - lost_s_ - now_s_;
+  double step_s = passed_s;
   // Only with a node, which looks every few milliseconds: without one nobody need look for long.
-  if (node_attached_) lost_s_ = std::max(lost_s_, clock_s - now_s_ - longest_s);
+  if (node_attached_) step_s = std::min(step_s, kLongestStep_s * clock_.speed());
+  const auto silent = std::chrono::steady_clock::now() - drive_.last_request();
+  if (clock_.speed() > 1 && silent > kMasterIsBusy && silent < kMasterHasGone) {
+    step_s *= kPaceForABusyMaster;
+  }
+  lost_s_ += passed_s - step_s;
   const double now_s = clock_s - lost_s_;
   now_s_ = now_s;
   while (unit_.next_time_s() <= now_s) {

@@ -43,8 +43,9 @@ class Machine {
       : clock_(speed), drive_(std::move(drive)), unit_(std::move(unit)) {}
 
   double speed() const { return clock_.speed(); }
-  /// World time. It falls behind the clock when this machine is too busy to keep up: the world then
-  /// runs slower for everybody, instead of leaping under the feet of whoever looks at it.
+  /// World time. It falls behind the clock when this machine is too busy to keep up, or (above 1×)
+  /// the drive's master is: the world then runs slower for everybody, instead of leaping under the
+  /// feet of whoever looks at it.
   double now_s();
 
   /// Runs `use(drive, t_s)` on the drive at the present world time t_s.

@@ -142,7 +142,8 @@ int run(int argc, char** argv) {
       ->required();
   app.add_option("--modbus", options.modbus, "tcp:ADDRESS:PORT (port 0: any free one) or rtu:LINK");
   app.add_option("--can", options.can, "unix:PATH or can:INTERFACE");
-  app.add_option("--speed", options.speed, "world seconds in one second")
+  app.add_option("--speed", options.speed,
+                 "world seconds in one second, at most: the world waits for a machine that is busy")
       ->check(CLI::Range(0.001, 10000.0));
   app.add_option("--seed", options.seed, "of everything random");
   app.add_option("--ready-file", options.ready_file,

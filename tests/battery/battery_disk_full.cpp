@@ -2,7 +2,7 @@
 // file system. Each time: one clear line, exit code 3 (or 2 before anything has begun), nothing
 // lost, and the run can be resumed.
 //
-//   battery_disk_full shim [--from N] [--step K] [--most M]
+//   battery_disk_full shim [--from N] [--step K] [--most M] [--jobs J]
 //   battery_disk_full limit        RLIMIT_FSIZE, ever larger
 //   battery_disk_full folder DIR   a small file system mounted at DIR
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <fstream>
@@ -47,12 +48,34 @@ void check(const Bench& bench, const TempFolder& folder, const fs::path& databas
   }
 }
 
-int shim(long from, long step, long most, double speed, const std::string& place) {
+/// Lets `meet(bench, folder, n)` meet the full disk at n = from, from + step … in `jobs` lanes,
+/// until it says that it was not met any more, or `most` times. Returns how often it was.
+template <class Meet>
+long meet_all(long from, long step, long most, int jobs, double speed, const std::string& place,
+              Meet&& meet) {
+  std::atomic<long> next = 0;
+  std::atomic<long> met = 0;
+  std::atomic<bool> all_met = false;
+  beside_each_other(jobs, [&](int) {
+    const TempFolder folder(place);
+    const Bench bench(folder, {.plan = kPlan.text(), .speed = speed});
+    while (!all_met) {
+      const long index = next++;
+      if (index >= most) return;
+      if (!meet(bench, folder, from + index * step)) {
+        all_met = true;
+        return;
+      }
+      if (++met % 50 == 0) fmt::print("battery-disk-full: {} met\n", met.load());
+      std::fflush(stdout);
+    }
+  });
+  return met;
+}
+
+int shim(long from, long step, long most, int jobs, double speed, const std::string& place) {
   Complaints complaints("battery-disk-full");
-  const TempFolder folder(place);
-  const Bench bench(folder, {.plan = kPlan.text(), .speed = speed});
-  long met = 0;
-  for (long n = from; met < most; n += step) {
+  const auto meet = [&](const Bench& bench, const TempFolder& folder, long n) {
     const fs::path database = folder / fmt::format("run{}.db", n);
     Ended ended;
     {
@@ -62,13 +85,12 @@ int shim(long from, long step, long most, double speed, const std::string& place
                        {"PLUMBLINE_DISK_FULL", std::to_string(n)}});
       ended = program.wait();
     }
-    if (ended.code == 0 || ended.code == 1) break;  // fewer steps than that: all have been met
-    ++met;
+    if (ended.code == 0 || ended.code == 1) return false;  // fewer steps: all have been met
     check(bench, folder, database, ended, fmt::format("step {}", n), complaints);
     for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(database.string() + suffix);
-    if (met % 50 == 0) fmt::print("battery-disk-full: {} failing steps\n", met);
-    std::fflush(stdout);
-  }
+    return true;
+  };
+  const long met = meet_all(from, step, most, jobs, speed, place, meet);
   fmt::print("battery-disk-full shim: {} failing steps, {} faults\n", met, complaints.count());
   return complaints.exit_code();
 }
@@ -174,13 +196,15 @@ int main(int argc, char** argv) {
   shim->add_option("--from", from);
   shim->add_option("--step", step);
   shim->add_option("--most", most);
+  int jobs = 1;
+  shim->add_option("--jobs", jobs, "so many rigs beside each other")->check(CLI::Range(1, 64));
   CLI::App* limit = app.add_subcommand("limit");
   CLI::App* folder = app.add_subcommand("folder");
   folder->add_option("place", place)->required();
   for (CLI::App* sub : {shim, limit, folder}) sub->add_option("--speed", speed);
   for (CLI::App* sub : {shim, limit}) sub->add_option("--in", place, "where the databases are");
   CLI11_PARSE(app, argc, argv);
-  if (shim->parsed()) return plumbline::battery::shim(from, step, most, speed, place);
+  if (shim->parsed()) return plumbline::battery::shim(from, step, most, jobs, speed, place);
   if (limit->parsed()) return plumbline::battery::limit(speed, place);
   return plumbline::battery::small_folder(place, speed);
 }

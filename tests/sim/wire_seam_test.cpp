@@ -110,6 +110,26 @@ TEST(WireSeamNode, ReplyWaitsForANodeThatGetsNoTime) {
   EXPECT_TRUE(on_the_bus);
 }
 
+TEST(WireSeamNode, AnAcceleratedWorldWaitsForAMasterThatGetsNoTime) {
+  using Clock = std::chrono::steady_clock;
+  WireRig rig({}, 100);
+  ModbusClient master(rig.serve_tcp());
+  const auto world_s = [&] {
+    return rig.machine.with_drive([](Drive&, double t_s) { return t_s; });
+  };
+  master.read16(0x20);
+  const auto begin = Clock::now();
+  const double begin_s = world_s();
+  std::this_thread::sleep_for(milliseconds(300));
+  const double passed_s = world_s() - begin_s;
+  const std::chrono::duration<double> host = Clock::now() - begin;
+  if (host.count() < 1.5) {
+    EXPECT_LT(passed_s, 100 * host.count() / 2);
+  }
+  // One that has gone is not waited for.
+  EXPECT_TRUE(eventually([&] { return world_s() - begin_s > 100; }));
+}
+
 TEST(WireSeamNode, SourceCountsWhatTheNodeSpoils) {
   const Fault silence{.kind = FaultKind::can_silence, .move = 0, .count = 7};
   const Fault bus_off{
