@@ -51,7 +51,8 @@ struct EffectParameter {
   double value = 0;
   double u = 0;
   std::string unit;
-  std::optional<FilterEstimate> filter = {};  ///< nothing for an index, which is not estimated
+  std::optional<FilterEstimate> filter = {};
+  bool estimated = false;  ///< by the fit, and not chosen among instants, bits or poses
 };
 
 /// How large an effect that was not found would have had to be: its amplitude at 5 standard

@@ -1,5 +1,7 @@
 #include "app/certificate/certificate_files.h"
 
+#include <future>
+
 #include "app/certificate/dcc/dcc_writer.h"
 #include "app/certificate/dcc/signature.h"
 #include "app/certificate/pdf_file.h"
@@ -21,8 +23,9 @@ Result<std::string> pages_of(const Document& document, const std::string& create
 Result<void> write_certificate(const CertificateInput& input, OutputFolder& folder) {
   const std::string& created_utc = input.provenance.created_utc;
   const Document document = make_certificate(input);
+  auto printing = std::async(std::launch::async, [&] { return pages_of(document, created_utc); });
   const std::string html = write_html(document);
-  const auto pages = pages_of(document, created_utc);
+  const auto pages = printing.get();
   if (!pages) return fail(pages.error());
   const auto opened = open_pdf(*pages, "certificate.pdf");
   if (!opened) return fail(ErrorCode::internal, opened.error().message);

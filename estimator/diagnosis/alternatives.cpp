@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
@@ -49,7 +52,6 @@ EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
 }  // namespace
 
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
-                                           const CandidateResponses& responses,
                                            const SearchResult& result, std::size_t index) {
   const Candidate& found = result.evidence[index].candidate;
   EnlargedParameters base = result.fit.parameters;
@@ -71,24 +73,28 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
 
   std::vector<Alternative> singles;
   // Responses at the final model: they hardly depend on the parameters.
-  const CandidateGains gains_of(responses, without);
+  const CandidateGains gains_of(result.responses, without);
   const auto ranked =
       best_of_families(list, gains_of, gains_of.of(without.whitened_residual).col(0));
-  std::size_t refined = 0;
+  std::vector<Candidate> refined;
   for (const Rival& rival : ranked) {
-    const Candidate& candidate = list.candidates[rival.candidate];
-    if (!usable(candidate)) continue;
     // The first order may understate a nonlinear rival, but not by this much.
-    if (++refined > kRefined || rival.gain < 0.5 * found_gain - kIndistinguishable) break;
-    const EnlargedFit fit = refit_with(input, result, base, {candidate});
-    if (!fit.determined) continue;
-    const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
-    if (without.chi2 - fit.chi2 < needed(std::max(free, found_free))) continue;
-    const std::string id = candidate.effect->id();
+    if (refined.size() == kRefined || rival.gain < 0.5 * found_gain - kIndistinguishable) break;
+    if (usable(list.candidates[rival.candidate]))
+      refined.push_back(list.candidates[rival.candidate]);
+  }
+  std::vector<EnlargedFit> fits(refined.size());
+  parallel_for(fits.size(),
+               [&](std::size_t k) { fits[k] = refit_with(input, result, base, {refined[k]}); });
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (!fits[k].determined) continue;
+    const auto free = static_cast<double>(fits[k].parameters.free_count() - base.free_count());
+    if (without.chi2 - fits[k].chi2 < needed(std::max(free, found_free))) continue;
+    const std::string id = refined[k].effect->id();
     if (id != found.effect->id() &&
         std::none_of(singles.begin(), singles.end(),
                      [&](const Alternative& s) { return s.name == id; }))
-      singles.push_back({id, fit});
+      singles.push_back({id, std::move(fits[k])});
   }
   std::stable_sort(singles.begin(), singles.end(), [](const Alternative& a, const Alternative& b) {
     return a.fit.chi2 < b.fit.chi2;
@@ -103,7 +109,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
     if (!sum.empty() && without.chi2 - fit.chi2 < 0.8 * found_gain) break;
     std::vector<Rival> order = ranked;
     if (!sum.empty()) {
-      const CandidateGains next(responses, fit);
+      const CandidateGains next(result.responses, fit);
       order = best_of_families(list, next, next.of(fit.whitened_residual).col(0));
     }
     const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {

@@ -19,9 +19,8 @@ struct Alternative {
 ///
 /// A rival counts when replacing the effect by it costs less likelihood than noise would
 /// (`kIndistinguishable` in χ², more for every further parameter). Sums are looked for only as long
-/// as a single rival does not do. `responses` are those of the list under the result's whitening.
+/// as a single rival does not do.
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
-                                           const CandidateResponses& responses,
                                            const SearchResult& result, std::size_t index);
 
 }  // namespace plumbline

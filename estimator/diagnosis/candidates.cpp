@@ -48,7 +48,8 @@ bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
 
 }  // namespace
 
-CandidateList all_candidates(const VisitLog& log) {
+CandidateList all_candidates(const VisitLog& log,
+                             const std::vector<std::shared_ptr<const Effect>>& own) {
   constexpr double kUnnamed = 7;
   CandidateList list;
   for (const Effect* effect : effect_catalogue()) add_candidates(list, log, *effect);
@@ -65,20 +66,14 @@ CandidateList all_candidates(const VisitLog& log) {
     list.owned.push_back(std::move(term));
     add_candidates(list, log, *list.owned.back(), kUnnamed);
   }
+  for (const auto& effect : own) {
+    list.owned.push_back(effect);
+    add_candidates(list, log, *effect);
+  }
   return list;
 }
 
 namespace {
-
-/// work(first, count) for blocks of neighbouring columns, on all cores.
-template <class Work>
-void for_column_blocks(Eigen::Index columns, const Work& work) {
-  constexpr Eigen::Index kBlock = 128;
-  parallel_for(static_cast<std::size_t>((columns + kBlock - 1) / kBlock), [&](std::size_t block) {
-    const Eigen::Index first = static_cast<Eigen::Index>(block) * kBlock;
-    work(first, std::min(kBlock, columns - first));
-  });
-}
 
 /// The model as it stands, evaluated once for all candidates.
 struct Baseline {
@@ -88,8 +83,8 @@ struct Baseline {
   std::vector<Eigen::Vector3d> a_g;  ///< seen through that geometry
 };
 
-// Term that a sensor effect adds to its axis, V, n rows.
-void add_sensor_response(const Baseline& base, const ActiveEffect& active,
+// Term of a sensor effect on its axis, V, n rows.
+void set_sensor_response(const Baseline& base, const ActiveEffect& active,
                          Eigen::Ref<Eigen::VectorXd> change) {
   const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
   const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
@@ -138,13 +133,15 @@ std::vector<ActiveEffect> single_amplitudes(const Candidate& candidate) {
 
 constexpr std::size_t kHead = 2 * kAxisCount;
 
+bool is_within_dwell(std::size_t group) { return group >= kAxisCount && group < kHead; }
+
 std::size_t group_of(const Candidate& candidate) {
   if (candidate.effect->subject() == Subject::head) return kHead;
   return candidate.axis + (candidate.effect->within_dwell() ? kAxisCount : 0);
 }
 
 // The course of the dwells that a sensor effect makes, V, n rows a contrast.
-void add_dwell_response(const Baseline& base, const ActiveEffect& active,
+void set_dwell_response(const Baseline& base, const ActiveEffect& active,
                         Eigen::Ref<Eigen::VectorXd> change) {
   const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
   const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
@@ -181,36 +178,44 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
     singles[group].insert(singles[group].end(), own.begin(), own.end());
   }
   const Baseline base{log, model, head_geometries(log, model), specific_forces_g(log, model)};
+  struct Block {
+    std::size_t group;
+    Eigen::Index first, count;
+  };
+  std::vector<Block> blocks;  // of neighbouring columns
   for (std::size_t g = 0; g <= kHead; ++g) {
     CandidateResponses::Group& group = responses.groups[g];
-    const bool of_head = g == kHead;
-    const bool within_dwell = !of_head && g >= kAxisCount;
-    const std::size_t axis = of_head ? 0 : g % kAxisCount;
-    const auto first_axis = static_cast<Eigen::Index>(axis);
     const Eigen::Index columns = std::ssize(singles[g]);
-    group.first_row = first_axis * n;
-    group.means = Eigen::MatrixXd::Zero(of_head ? mean_rows(log) : n, columns);
-    group.first_dwell_row = mean_rows(log) + first_axis * log.dwell_contrasts() * n;
-    group.dwells = Eigen::MatrixXd::Zero(within_dwell ? log.dwell_contrasts() * n : 0, columns);
-    for_column_blocks(columns, [&](Eigen::Index first, Eigen::Index count) {
-      auto block = group.means.middleCols(first, count);
-      for (Eigen::Index j = 0; j < count; ++j) {
-        const ActiveEffect& single = singles[g][static_cast<std::size_t>(first + j)];
-        if (of_head) {
-          add_head_response(base, single, block.col(j));
-        } else {
-          add_sensor_response(base, single, block.col(j));
-        }
-        if (within_dwell) add_dwell_response(base, single, group.dwells.col(first + j));
-      }
-      for (std::size_t i = axis; i < (of_head ? kAxisCount : axis + 1); ++i) {
-        auto rows = block.middleRows(static_cast<Eigen::Index>(i - axis) * n, n);
-        whitening.lower[i].triangularView<Eigen::Lower>().solveInPlace(rows);
-      }
-    });
-    for (Eigen::Index d = 0; within_dwell && d < log.dwell_contrasts(); ++d)
-      group.dwells.middleRows(d * n, n) /= whitening.dwell_sd_V[axis](d);
+    const auto axis = static_cast<Eigen::Index>(g == kHead ? 0 : g % kAxisCount);
+    group.first_row = axis * n;
+    group.means.resize(g == kHead ? mean_rows(log) : n, columns);
+    group.first_dwell_row = mean_rows(log) + axis * log.dwell_contrasts() * n;
+    group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * n : 0, columns);
+    constexpr Eigen::Index kColumns = 64;
+    for (Eigen::Index first = 0; first < columns; first += kColumns)
+      blocks.push_back({g, first, std::min(kColumns, columns - first)});
   }
+  parallel_for(blocks.size(), [&](std::size_t b) {
+    const auto& [g, first, count] = blocks[b];
+    CandidateResponses::Group& group = responses.groups[g];
+    auto means = group.means.middleCols(first, count);
+    auto dwells = group.dwells.middleCols(first, count);
+    if (g == kHead) means.setZero();
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const ActiveEffect& single = singles[g][static_cast<std::size_t>(first + j)];
+      if (g == kHead) {
+        add_head_response(base, single, means.col(j));
+      } else {
+        set_sensor_response(base, single, means.col(j));
+      }
+      if (is_within_dwell(g)) set_dwell_response(base, single, dwells.col(j));
+    }
+    const std::size_t axis = g == kHead ? 0 : g % kAxisCount;
+    for (Eigen::Index row = 0; row < means.rows(); row += n)
+      whitening.apply_to_means(axis + static_cast<std::size_t>(row / n), means.middleRows(row, n));
+    for (Eigen::Index d = 0; d * n < dwells.rows(); ++d)
+      dwells.middleRows(d * n, n) /= whitening.dwell_sd_V[axis](d);
+  });
   return responses;
 }
 

@@ -35,9 +35,11 @@ struct CandidateList {
 void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
                     double handicap = 0);
 
-/// The catalogue, every recorded column, and smooth terms in every variable. A term without a name
-/// must be e^7 times as likely as one with a name: a polynomial can imitate much.
-CandidateList all_candidates(const VisitLog& log);
+/// The catalogue, every recorded column, smooth terms in every variable, and the user's `own`
+/// effects. A term without a name must be e^7 times as likely as one with a name: a polynomial can
+/// imitate much.
+CandidateList all_candidates(const VisitLog& log,
+                             const std::vector<std::shared_ptr<const Effect>>& own = {});
 
 /// What each candidate would add to the whitened observations. A sensor effect moves one axis only,
 /// so its columns hold n rows; those of the head hold 3n; what changes within the dwell has rows

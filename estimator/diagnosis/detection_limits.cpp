@@ -109,9 +109,8 @@ double sigmas(const CandidateGains& gains, std::size_t candidate) {
 }  // namespace
 
 std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
-                                             const CandidateResponses& responses,
                                              const SearchResult& result) {
-  const CandidateGains gains(responses, result.fit);
+  const CandidateGains gains(result.responses, result.fit);
   std::vector<Amplitude> amplitudes;
   std::vector<Size> sizes;
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {

@@ -10,10 +10,8 @@ namespace plumbline {
 /// For every named effect that is not in the model, axis by axis: the amplitude that is 5 standard
 /// uncertainties in the final model, with the final noise, estimated together with everything in
 /// the model. An effect without amplitude (a dead zone, a clipping limit) is stated by the size at
-/// which its response stands out as much. First order in amplitudes. `responses` are those of the
-/// list under the result's whitening and model.
+/// which its response stands out as much. First order in amplitudes.
 std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
-                                             const CandidateResponses& responses,
                                              const SearchResult& result);
 
 }  // namespace plumbline

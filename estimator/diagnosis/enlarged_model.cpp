@@ -102,10 +102,12 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 
 namespace {
 
+using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
+
 /// Calls work(input, active effect) for every sensor effect of one axis at every visit.
 template <class Work>
 void for_sensor_terms(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
-                      const std::vector<Eigen::Vector3d>& a_g, const Work& work) {
+                      const Forces& a_g, const Work& work) {
   const Eigen::Vector4d& twelve = parameters.twelve[axis];
   const double K_ii = twelve(static_cast<Eigen::Index>(axis));
   for (std::size_t k = 0; k < log.visits.size(); ++k) {
@@ -117,24 +119,45 @@ void for_sensor_terms(const VisitLog& log, const EnlargedParameters& parameters,
   }
 }
 
+Eigen::VectorXd means_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                std::size_t axis, const Forces& a_g) {
+  const Eigen::Vector4d& twelve = parameters.twelve[axis];
+  Eigen::VectorXd mean_V(std::ssize(a_g));
+  for (Eigen::Index k = 0; k < mean_V.size(); ++k)
+    mean_V(k) = twelve(3) + twelve.head<3>().dot(a_g[static_cast<std::size_t>(k)]);
+  for_sensor_terms(log, parameters, axis, a_g,
+                   [&](const TermInput& input, const ActiveEffect& active) {
+                     mean_V(static_cast<Eigen::Index>(input.visit)) +=
+                         input.K_V_per_g * active.effect->term_g(input, active.p.data());
+                   });
+  return mean_V;
+}
+
+/// n × contrasts.
+Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                 std::size_t axis, const Forces& a_g) {
+  Eigen::MatrixXd dwell_V = Eigen::MatrixXd::Zero(std::ssize(a_g), log.dwell_contrasts());
+  if (!has_effect_within_dwell(parameters)) return dwell_V;
+  for_sensor_terms(
+      log, parameters, axis, a_g, [&](const TermInput& input, const ActiveEffect& active) {
+        if (active.effect->within_dwell())
+          dwell_V.row(static_cast<Eigen::Index>(input.visit)) += dwell_contrasts_V(input, active);
+      });
+  return dwell_V;
+}
+
 }  // namespace
+
+bool has_effect_within_dwell(const EnlargedParameters& parameters) {
+  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
+                     [](const ActiveEffect& active) { return active.effect->within_dwell(); });
+}
 
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
                                          const EnlargedParameters& parameters) {
-  const std::size_t n = log.visits.size();
-  const std::vector<Eigen::Vector3d> a_g = specific_forces_g(log, parameters);
+  const Forces a_g = specific_forces_g(log, parameters);
   PerAxis<Eigen::VectorXd> mean_V;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const Eigen::Vector4d& twelve = parameters.twelve[i];
-    mean_V[i].resize(static_cast<Eigen::Index>(n));
-    for (std::size_t k = 0; k < n; ++k)
-      mean_V[i](static_cast<Eigen::Index>(k)) = twelve(3) + twelve.head<3>().dot(a_g[k]);
-    for_sensor_terms(log, parameters, i, a_g,
-                     [&](const TermInput& input, const ActiveEffect& active) {
-                       mean_V[i](static_cast<Eigen::Index>(input.visit)) +=
-                           input.K_V_per_g * active.effect->term_g(input, active.p.data());
-                     });
-  }
+  for (std::size_t i = 0; i < kAxisCount; ++i) mean_V[i] = means_of_axis_V(log, parameters, i, a_g);
   return mean_V;
 }
 
@@ -150,20 +173,10 @@ Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& ac
 
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
                                           const EnlargedParameters& parameters) {
+  const Forces a_g = specific_forces_g(log, parameters);
   PerAxis<Eigen::MatrixXd> dwell_V;
-  dwell_V.fill(Eigen::MatrixXd::Zero(std::ssize(log.visits), log.dwell_contrasts()));
-  if (std::none_of(parameters.effects.begin(), parameters.effects.end(),
-                   [](const ActiveEffect& a) { return a.effect->within_dwell(); }))
-    return dwell_V;
-  const std::vector<Eigen::Vector3d> a_g = specific_forces_g(log, parameters);
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    for_sensor_terms(log, parameters, i, a_g,
-                     [&](const TermInput& input, const ActiveEffect& active) {
-                       if (active.effect->within_dwell())
-                         dwell_V[i].row(static_cast<Eigen::Index>(input.visit)) +=
-                             dwell_contrasts_V(input, active);
-                     });
-  }
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    dwell_V[i] = dwells_of_axis_V(log, parameters, i, a_g);
   return dwell_V;
 }
 
@@ -217,16 +230,24 @@ Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
   return all;
 }
 
-std::vector<double> difference_steps(const EnlargedParameters& parameters) {
-  std::vector<double> steps;
-  for (std::size_t i = 0; i < 4 * kAxisCount; ++i) steps.push_back(1e-6);
+/// What one column of the Jacobian is about.
+struct FreeParameter {
+  std::optional<std::size_t> axis;  ///< the only one that it concerns
+  double step;                      ///< of the central difference
+};
+
+std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters) {
+  std::vector<FreeParameter> all;
+  for (std::size_t i = 0; i < 4 * kAxisCount; ++i) all.push_back({i / 4, 1e-6});
   for (const ActiveEffect& active : parameters.effects) {
     const auto infos = active.effect->parameters();
+    std::optional<std::size_t> axis;
+    if (active.effect->subject() == Subject::sensor) axis = active.axis;
     for (std::size_t k = 0; k < active.p.size(); ++k) {
-      if (active.free[k]) steps.push_back(difference_step(infos[k], active.p[k]));
+      if (active.free[k]) all.push_back({axis, difference_step(infos[k], active.p[k])});
     }
   }
-  return steps;
+  return all;
 }
 
 }  // namespace
@@ -237,20 +258,55 @@ Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters&
 
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {
   const Eigen::VectorXd centre = parameters.free_values();
-  const std::vector<double> steps = difference_steps(parameters);
-  Eigen::MatrixXd jacobian(stacked_rows(log), centre.size());
-  parallel_for(steps.size(), [&](std::size_t column) {
+  const std::vector<FreeParameter> free = free_parameters(parameters);
+  const Forces a_g = specific_forces_g(log, parameters);
+  const Eigen::Index n = std::ssize(a_g), contrasts = log.dwell_contrasts();
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(stacked_rows(log), centre.size());
+  parallel_for(free.size(), [&](std::size_t column) {
     const auto j = static_cast<Eigen::Index>(column);
-    EnlargedParameters moved = parameters;
-    Eigen::VectorXd values = centre;
-    values(j) = centre(j) + steps[column];
-    moved.set_free_values(values);
-    const Eigen::VectorXd above = predict_stacked_V(log, moved);
-    values(j) = centre(j) - steps[column];
-    moved.set_free_values(values);
-    jacobian.col(j) = (above - predict_stacked_V(log, moved)) / (2 * steps[column]);
+    const auto& [only_axis, step] = free[column];
+    const auto moved = [&](double by) {
+      EnlargedParameters other = parameters;
+      Eigen::VectorXd values = centre;
+      values(j) += by;
+      other.set_free_values(values);
+      return other;
+    };
+    const EnlargedParameters above = moved(step), below = moved(-step);
+    if (!only_axis) {
+      jacobian.col(j) =
+          (predict_stacked_V(log, above) - predict_stacked_V(log, below)) / (2 * step);
+      return;
+    }
+    // What belongs to one axis leaves the head, and so the forces, where they are.
+    const std::size_t axis = *only_axis;
+    const auto i = static_cast<Eigen::Index>(axis);
+    jacobian.col(j).segment(i * n, n) =
+        (means_of_axis_V(log, above, axis, a_g) - means_of_axis_V(log, below, axis, a_g)) /
+        (2 * step);
+    jacobian.col(j).segment((kAxes + i * contrasts) * n, contrasts * n) =
+        (dwells_of_axis_V(log, above, axis, a_g) - dwells_of_axis_V(log, below, axis, a_g))
+            .reshaped() /
+        (2 * step);
   });
   return jacobian;
+}
+
+void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
+  lower[axis] = Eigen::LLT<Eigen::MatrixXd>(covariance_V2).matrixL();
+  inverse[axis].setIdentity(lower[axis].rows(), lower[axis].cols());
+  lower[axis].triangularView<Eigen::Lower>().solveInPlace(inverse[axis]);
+}
+
+void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const {
+  // What concerns later visits only is zero before them, and stays so.
+  Eigen::Index first = 0;
+  while (first < means_V.rows() && (means_V.row(first).array() == 0).all()) ++first;
+  const Eigen::Index rest = means_V.rows() - first;
+  means_V.bottomRows(rest) =
+      (inverse[axis].bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() *
+       means_V.bottomRows(rest))
+          .eval();
 }
 
 Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
@@ -258,8 +314,7 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   const Eigen::Index n = lower[0].rows();
   parallel_for(kAxisCount, [&](std::size_t axis) {
     const auto i = static_cast<Eigen::Index>(axis);
-    auto means = whitened.middleRows(i * n, n);
-    lower[axis].triangularView<Eigen::Lower>().solveInPlace(means);
+    apply_to_means(axis, whitened.middleRows(i * n, n));
     const Eigen::Index contrasts = dwell_sd_V[axis].size();
     for (Eigen::Index d = 0; d < contrasts; ++d)
       whitened.middleRows((kAxes + i * contrasts + d) * n, n) /= dwell_sd_V[axis](d);
@@ -270,6 +325,8 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start) {
   constexpr int kMaxIterations = 20;
+  const Eigen::Index rows =
+      has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
   const Eigen::VectorXd measured = stacked(observed.mean_V, observed.dwell_V);
   const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
     return whitening.apply(measured - predict_stacked_V(log, parameters));
@@ -283,13 +340,14 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
     fit.determined = norms.minCoeff() > 0;
     if (!fit.determined) return fit;
-    const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
+                                                         norms.cwiseInverse().asDiagonal());
     const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
     fit.determined = diagonal.minCoeff() > 1e-7 * diagonal.maxCoeff();
     if (!fit.determined) return fit;
 
-    const Eigen::VectorXd step = norms.cwiseInverse().cwiseProduct(qr.solve(fit.whitened_residual));
+    const Eigen::VectorXd step =
+        norms.cwiseInverse().cwiseProduct(qr.solve(fit.whitened_residual.head(rows)));
     double share = 1;
     bool improved = false;
     for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
@@ -308,9 +366,9 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     if (!improved) fit.converged = true;  // no direction leads down any more
   }
   const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
-  const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
-  const Eigen::MatrixXd r = qr.matrixQR().topRows(scaled.cols()).triangularView<Eigen::Upper>();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
+                                                 norms.cwiseInverse().asDiagonal());
+  const Eigen::MatrixXd r = qr.matrixQR().topRows(norms.size()).triangularView<Eigen::Upper>();
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(r.rows(), r.cols());
   r.triangularView<Eigen::Upper>().solveInPlace(inverse);
   inverse = norms.cwiseInverse().asDiagonal() * inverse;

@@ -45,6 +45,10 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 /// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
 
+/// Whether the model has effects that change while the head rests: only then are the rows of the
+/// dwells anything but zero.
+bool has_effect_within_dwell(const EnlargedParameters& parameters);
+
 /// Predicted contrasts of the dwells, V, n × log.dwell_contrasts() per axis.
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
                                           const EnlargedParameters& parameters);
@@ -71,18 +75,25 @@ Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters&
 /// fitted to each parameter's size.
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters);
 
-/// n × n lower Cholesky factors of the pose-mean covariance per axis, and the standard deviations
-/// of the contrasts, which are independent from visit to visit.
+/// n × n lower Cholesky factors of the pose-mean covariance per axis with their inverses, and the
+/// standard deviations of the contrasts, which are independent from visit to visit.
 struct PoseWhitening {
-  PerAxis<Eigen::MatrixXd> lower;
+  PerAxis<Eigen::MatrixXd> lower, inverse;
   PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< one a contrast
+  /// Takes over the covariance of one axis.
+  void set(std::size_t axis, const Eigen::MatrixXd& covariance_V2);
+  /// Whitens n rows, the means of one axis, in place.
+  void apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const;
   /// Whitens a matrix of stacked rows.
   Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
 };
 
-struct EnlargedFit {
+struct EnlargedEstimate {
   EnlargedParameters parameters;
-  Eigen::MatrixXd covariance;         ///< of the free parameters
+  Eigen::MatrixXd covariance;  ///< of the free parameters
+};
+
+struct EnlargedFit : EnlargedEstimate {
   Eigen::VectorXd whitened_residual;  ///< stacked
   Eigen::MatrixXd whitened_jacobian;  ///< stacked × free
   double chi2 = 0;

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/diagnosis/diagnose.h"
+#include "estimator/diagnosis/detection_limits.h"
+#include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/heldout.h"
+#include "estimator/diagnosis/separation.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
@@ -44,8 +46,7 @@ double heldout_gain(const PerAxis<Eigen::VectorXd>& without, const PerAxis<Eigen
                     const PerAxis<double>& floor_mps2, const std::vector<std::size_t>& axes) {
   double expected = 0;
   for (std::size_t axis : axes) expected += floor_mps2[axis] * floor_mps2[axis];
-  const double before = power(without, axes), after = power(with, axes);
-  return (before - after) / std::max({before - expected, before - after, 1e-12 * before});
+  return share_removed(power(without, axes), power(with, axes), expected);
 }
 
 /// Four parameters of one axis out of the joint estimate.
@@ -75,10 +76,7 @@ std::optional<JointEstimate> joint_estimate(const ExplainInput& input, const Sea
                                             const SearchResult& found) {
   JointReadings readings;
   PerAxis<NoiseModel> noise;
-  const auto& effects = found.fit.parameters.effects;
-  const bool within_dwell = std::any_of(effects.begin(), effects.end(), [](const auto& active) {
-    return active.effect->within_dwell();
-  });
+  const bool within_dwell = has_effect_within_dwell(found.fit.parameters);
   const auto n = std::ssize(input.poses);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     noise[axis] = filter_noise(input, search, found, axis);
@@ -155,7 +153,7 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
                                    heldout_dwell_gain(search.log, found.observed, found.whitening,
                                                       found.fit, k, partitions));
       // One pose's own error cannot be predicted from other poses.
-      const bool own = removed.effect->concerns_one_visit() || removed.effect->certain();
+      const bool own = removed.effect->concerns_one_visit() || removed.effect->certain(search.log);
       if (gain > 0 || own) {
         gains.push_back(std::max(gain, 0.0));
         continue;
@@ -180,10 +178,12 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                            start, &input.pooled};
   SearchOptions search_options;
   search_options.seed = options.seed;
-  Diagnosed diagnosed = diagnose(search, search_options, options);
-  SearchResult& found = diagnosed.search;
-  result.diagnosis.not_found = diagnosed.diagnosis.not_found;
-  if (found.evidence.empty()) return std::nullopt;
+  const CandidateList candidates = all_candidates(log, options.own_effects);
+  SearchResult found = search_effects(search, candidates, search_options);
+  if (found.evidence.empty()) {
+    result.diagnosis.not_found = detection_limits(search, candidates, found);
+    return std::nullopt;
+  }
 
   std::vector<double> gains;
   const std::size_t before_dropping = found.evidence.size();
@@ -191,9 +191,15 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const Heldout heldout(log, mean_V, found.whitening);
   const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
   drop_what_does_not_carry(search, heldout, partitions, result.floor_pose_rms_mps2, found, gains);
-  if (found.evidence.empty()) return std::nullopt;
-  if (found.evidence.size() != before_dropping) describe_findings(search, diagnosed);
-  attach_gains(diagnosed, gains);
+  if (found.evidence.size() != before_dropping)
+    found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
+  if (found.evidence.empty()) {
+    result.diagnosis.not_found = detection_limits(search, candidates, found);
+    return std::nullopt;
+  }
+  Diagnosis diagnosis =
+      describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
+  attach_gains(found.evidence, gains, diagnosis);
 
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
   const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
@@ -206,9 +212,9 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const auto n = std::ssize(input.poses);
   const auto joint = joint_estimate(input, search, found);
   if (joint) {
-    const Eigen::Index effects = joint->value.size() - 12;
-    attach_filter(diagnosed, joint->value.tail(effects),
-                  joint->covariance.diagonal().tail(effects).cwiseMax(0).cwiseSqrt());
+    EnlargedEstimate filter{found.fit.parameters, joint->covariance};
+    filter.parameters.set_free_values(joint->value);
+    attach_filter(log, filter, diagnosis);
   }
   WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
@@ -250,16 +256,15 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   // What is left against the noise that was re-estimated beside the effects.
   const double dof = 3 * static_cast<double>(input.poses.size()) -
                      static_cast<double>(found.fit.covariance.rows());
-  if (chi_squared_tail(chi2, dof) < 1e-4 && diagnosed.diagnosis.verdict == Verdict::explained) {
-    diagnosed.diagnosis.verdict = Verdict::partly_explained;
+  if (chi_squared_tail(chi2, dof) < 1e-4 && diagnosis.verdict == Verdict::explained) {
+    diagnosis.verdict = Verdict::partly_explained;
   }
-  diagnosed.diagnosis.axis_test = result.diagnosis.axis_test;
+  diagnosis.axis_test = result.diagnosis.axis_test;
   // How large the residual was, then what it comes from.
   if (result.diagnosis.verdict == Verdict::unexplained) {
-    diagnosed.diagnosis.reason =
-        result.diagnosis.reason + "; explained by " + diagnosed.diagnosis.reason;
+    diagnosis.reason = result.diagnosis.reason + "; explained by " + diagnosis.reason;
   }
-  result.diagnosis = std::move(diagnosed.diagnosis);
+  result.diagnosis = std::move(diagnosis);
   return worst;
 }
 
@@ -308,13 +313,11 @@ EnlargedParameters restore_model(const CertifiedModel& model, const VisitLog& lo
     terms.push_back(std::move(term));
     owned.push_back(terms.back());
   }
+  std::vector<const Effect*> named = effect_catalogue();
+  for (const auto& effect : model.own_effects) named.push_back(effect.get());
   for (const FoundEffect& found : model.effects) {
-    for (const Effect* effect : effect_catalogue()) {
+    for (const Effect* effect : named)
       if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, restored);
-    }
-    for (const auto& effect : model.own_effects) {
-      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, restored);
-    }
     for (const auto& effect : owned) {
       // Bias and scale form of a column share the id; the unit of c tells them apart.
       if (effect->id() == found.id && !found.parameters.empty() &&

@@ -109,6 +109,10 @@ std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
   return result;
 }
 
+double share_removed(double without, double with, double expected) {
+  return (without - with) / std::max({without - expected, without - with, 1e-12 * without});
+}
+
 double heldout_dwell_gain(const VisitLog& log, const Observations& observed,
                           const PoseWhitening& whitening, const EnlargedFit& fit, std::size_t k,
                           const std::vector<Blocks>& partitions) {
@@ -135,7 +139,7 @@ double heldout_dwell_gain(const VisitLog& log, const Observations& observed,
     }
   }
   const double expected = static_cast<double>(partitions.size()) * static_cast<double>(left.size());
-  return (before - after) / std::max({before - expected, before - after, 1e-12 * before});
+  return share_removed(before, after, expected);
 }
 
 }  // namespace plumbline

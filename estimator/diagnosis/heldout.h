@@ -26,6 +26,9 @@ class Heldout {
   PerAxis<Eigen::MatrixXd> inverse_;  ///< of the covariance of the pose means
 };
 
+/// Share of the excess of a sum of squares over what noise leaves of it that an effect removes.
+double share_removed(double without, double with, double expected);
+
 /// Share of what effect `k` of a fitted model has to explain within the dwells (sum of squares of
 /// the whitened contrasts beyond noise) that it explains on visits which its size was not taken
 /// from. 0 for an effect that is constant within the dwells. `whitening` is that of the fit.

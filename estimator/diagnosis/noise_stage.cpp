@@ -12,7 +12,6 @@ namespace {
 Eigen::MatrixXd independent_columns(const Eigen::MatrixXd& block) {
   // Columns of other axes are zero here; what one axis alone cannot tell apart stays in: a head
   // angle seen by this axis only weakly costs one degree of freedom at most.
-  std::vector<Eigen::Index> kept;
   const Eigen::VectorXd norms = block.colwise().norm();
   Eigen::MatrixXd basis(block.rows(), 0);
   for (Eigen::Index j = 0; j < block.cols(); ++j) {
@@ -50,8 +49,10 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
 
 }  // namespace
 
+KnownNoise all_of(const PerAxis<PooledNoise>& noise) { return {&noise[0], &noise[1], &noise[2]}; }
+
 Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
-                   const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before,
+                   const KnownNoise& known, const PerAxis<PooledNoise>* before,
                    const Eigen::MatrixXd& beside) {
   const auto predicted = predict_means_V(input.log, parameters);
   const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
@@ -72,8 +73,8 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     };
     free_means(predicted[i]);
     const Eigen::VectorXd first_V2 = free.variance_V2;
-    if (known != nullptr) {
-      stage.noise[i] = (*known)[i];
+    if (known[i] != nullptr) {
+      stage.noise[i] = *known[i];
     } else {
       Eigen::MatrixXd columns(n, jacobian.cols() + beside.cols());
       columns << jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n), beside;
@@ -89,16 +90,16 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     if (free.coarse) {
       free_means(predicted[i] +
                  expected_from_others(stage.noise[i].covariance, mean_V - predicted[i]));
-      if (known == nullptr) stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
+      if (known[i] == nullptr) stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
     }
     stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
-    stage.whitening.lower[i] = Eigen::LLT<Eigen::MatrixXd>(stage.noise[i].covariance).matrixL();
+    stage.whitening.set(i, stage.noise[i].covariance);
   });
   return stage;
 }
 
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
-             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before) {
+             const KnownNoise& known, const PerAxis<PooledNoise>* before) {
   Stage stage = settle_noise(input, parameters, known, before);
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
@@ -106,18 +107,11 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
 
 namespace {
 
-bool is_slow_in_order(const VisitLog& log) {
+bool is_slow_in_order(const Eigen::VectorXd& values) {
   constexpr double kSlow = 0.05;  // mean squared change from visit to visit, of twice the variance
-  double sum = 0, squares = 0, changes = 0, before = 0;
-  for (const Visit& visit : log.visits) {
-    const double height = std::sin(visit.h_rad);
-    sum += height;
-    squares += height * height;
-    if (&visit != &log.visits.front()) changes += (height - before) * (height - before);
-    before = height;
-  }
-  const auto n = static_cast<double>(log.visits.size());
-  return changes < kSlow * 2 * (squares - sum * sum / n);
+  const Eigen::Index changes = values.size() - 1;
+  return (values.tail(changes) - values.head(changes)).squaredNorm() <
+         kSlow * 2 * (values.array() - values.mean()).matrix().squaredNorm();
 }
 
 }  // namespace
@@ -141,7 +135,10 @@ Eigen::MatrixXd slow_functions(const VisitLog& log) {
   for (std::size_t c = 0; c < log.covariate_names.size(); ++c)
     add([c](const Visit& visit) { return visit.covariate[c]; });
   // Where one ring is visited after the other, the height of the spindle is slow, too.
-  if (!is_slow_in_order(log)) return functions;
+  Eigen::VectorXd height(n);
+  for (Eigen::Index k = 0; k < n; ++k)
+    height(k) = std::sin(log.visits[static_cast<std::size_t>(k)].h_rad);
+  if (!is_slow_in_order(height)) return functions;
   for (const double power : {2.0, 3.0})
     add([power](const Visit& visit) { return std::pow(std::sin(visit.h_rad), power); });
   return functions;

@@ -16,17 +16,20 @@ struct Stage {
   PoseWhitening whitening;
 };
 
-/// The noise under given parameters; `fit` stays empty. `known`: when it has been pooled already,
-/// or null; `before`: powers to start from, or null; `beside`: further functions of the visits, n ×
-/// any number, that the noise is estimated beside.
+/// Noise of an axis that has been pooled already; null where it has not.
+using KnownNoise = PerAxis<const PooledNoise*>;
+KnownNoise all_of(const PerAxis<PooledNoise>& noise);
+
+/// The noise under given parameters; `fit` stays empty. `before`: powers to start from, or null;
+/// `beside`: further functions of the visits, n × any number, that the noise is estimated beside.
 Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
-                   const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before,
+                   const KnownNoise& known, const PerAxis<PooledNoise>* before,
                    const Eigen::MatrixXd& beside = {});
 
 /// The same with the model fitted. Noise and parameters depend on each other only weakly: one round
 /// after the parameters are known settles both.
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
-             const PerAxis<PooledNoise>* known, const PerAxis<PooledNoise>* before);
+             const KnownNoise& known, const PerAxis<PooledNoise>* before);
 
 /// What changes slowly and could pass for slow noise: the time to the second order, powers of the
 /// height of the spindle where the order of the poses makes that slow, and what was

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 #include <utility>
 
@@ -34,17 +35,21 @@ double effective_looks(const CandidateGains& gains_of, std::size_t candidates, E
   Eigen::MatrixXd noise(rows, options.replicates);
   for (double& value : noise.reshaped()) value = normal(generator);
   const Eigen::MatrixXd gains = gains_of.of(gains_of.project(noise));
-  double sum = 0;
-  for (Eigen::Index r = 0; r < gains.cols(); ++r) {
-    double best = 0;
+  Eigen::VectorXd log_none(gains.cols());  // that no candidate does as well in such noise
+  parallel_for(static_cast<std::size_t>(gains.cols()), [&](std::size_t replicate) {
+    const auto r = static_cast<Eigen::Index>(replicate);
+    // Among candidates of equal freedom the largest gain is the least probable.
+    std::map<int, double> largest;
     for (std::size_t c = 0; c < candidates; ++c) {
-      if (gains_of.dof(c) == 0) continue;
-      best = std::min(
-          best, log_chi_squared_tail(gains(static_cast<Eigen::Index>(c), r), gains_of.dof(c)));
+      double& gain = largest[gains_of.dof(c)];
+      gain = std::max(gain, gains(static_cast<Eigen::Index>(c), r));
     }
-    sum += std::log1p(-std::exp(std::min(best, -1e-12)));
-  }
-  return std::max(1.0, -static_cast<double>(options.replicates) / sum);
+    double best = 0;
+    for (const auto& [dof, gain] : largest)
+      if (dof > 0) best = std::min(best, log_chi_squared_tail(gain, dof));
+    log_none(r) = std::log1p(-std::exp(std::min(best, -1e-12)));
+  });
+  return std::max(1.0, -static_cast<double>(options.replicates) / log_none.sum());
 }
 
 double p_of_search(double log_p_local, double looks) {
@@ -82,17 +87,38 @@ EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& act
   return model;
 }
 
+/// Whether two models have the same effects on an axis, whatever their sizes.
+bool same_on_axis(const EnlargedParameters& a, const EnlargedParameters& b, std::size_t axis) {
+  const auto effects_on = [axis](const EnlargedParameters& model) {
+    std::vector<const ActiveEffect*> found;
+    for (const ActiveEffect& active : model.effects)
+      if (active.effect->subject() == Subject::head || active.axis == axis)
+        found.push_back(&active);
+    return found;
+  };
+  const auto of_a = effects_on(a), of_b = effects_on(b);
+  return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+                    [](const ActiveEffect* x, const ActiveEffect* y) {
+                      if (x->effect != y->effect || x->free != y->free) return false;
+                      for (std::size_t k = 0; k < x->p.size(); ++k)
+                        if (!x->free[k] && x->p[k] != y->p[k]) return false;
+                      return true;
+                    });
+}
+
 /// The search on its way: the model, and what each of its effects cost to find.
 class Search {
  public:
   Search(const SearchInput& input, const CandidateList& list, const SearchOptions& options)
       : input_(input), list_(list), options_(options) {
-    stage_ = settle(input, input.start, input.pooled, nullptr);
+    const KnownNoise known = input.pooled != nullptr ? all_of(*input.pooled) : KnownNoise{};
+    stage_ = settle(input, input.start, known, nullptr);
+    noise_is_own_ = input.pooled == nullptr;
   }
 
   SearchResult run() {
     for (std::size_t c = 0; c < list_.candidates.size(); ++c)
-      if (list_.candidates[c].effect->certain()) adopt_proven(c);
+      if (list_.candidates[c].effect->certain(input_.log)) adopt_proven(c);
     while (chosen_.size() < options_.max_effects && (add_one() || add_slow_one()))
       drop_superfluous();
     while (exchange_one()) drop_superfluous();
@@ -167,17 +193,27 @@ class Search {
   }
   /// Takes over a model when its parameters are determined.
   bool adopt(const EnlargedParameters& parameters) {
-    Stage next = settle(input_, parameters, nullptr, &stage_.noise);
+    KnownNoise known{};
+    for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
+      if (same_on_axis(parameters, stage_.fit.parameters, axis)) known[axis] = &stage_.noise[axis];
+    Stage next = settle(input_, parameters, known, &stage_.noise);
     if (!next.fit.determined) return false;
     stage_ = std::move(next);
+    noise_is_own_ = true;
+    responses_.reset();
     return true;
+  }
+
+  /// Those of the candidates beside the model as it stands.
+  const CandidateResponses& responses() {
+    if (!responses_)
+      responses_ = candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
+    return *responses_;
   }
 
   /// Adds the best candidate if the search as a whole would not often find as much in noise.
   bool add_one() {
-    const CandidateResponses responses =
-        candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
-    const CandidateGains gains(responses, stage_.fit);
+    const CandidateGains gains(responses(), stage_.fit);
     std::vector<Scored> ranked =
         screen(list_, gains, gains.of(stage_.fit.whitened_residual).col(0));
     std::erase_if(ranked, [&](const Scored& s) {
@@ -197,26 +233,30 @@ class Search {
 
     // First order ranks; the full response decides.
     constexpr std::size_t kRefined = 10;
+    std::vector<EnlargedFit> fits(std::min(kRefined, ranked.size()));
+    parallel_for(fits.size(), [&](std::size_t k) {
+      fits[k] = fit_with(stage_.fit.parameters, list_.candidates[ranked[k].candidate].active());
+    });
     const Scored* winner = nullptr;
-    EnlargedFit winner_fit;
+    EnlargedParameters with_winner;
     double winner_score = std::numeric_limits<double>::infinity(), winner_log_p = 0;
-    for (std::size_t k = 0; k < std::min(kRefined, ranked.size()); ++k) {
+    for (std::size_t k = 0; k < fits.size(); ++k) {
       const Scored& s = ranked[k];
-      EnlargedFit with = fit_with(stage_.fit.parameters, list_.candidates[s.candidate].active());
+      const EnlargedFit& with = fits[k];
       if (!with.determined) continue;
       const double log_p =
           log_p_of(s.candidate, stage_.fit.chi2 - with.chi2, gains.dof(s.candidate), with);
       const double score = log_p + (s.score - s.log_p);
       if (score < winner_score) {
         winner = &s;
-        winner_fit = std::move(with);
+        with_winner = with.parameters;
         winner_score = score;
         winner_log_p = log_p;
       }
     }
     if (winner == nullptr) return replace_overlapping(ranked, gains);
     const double p = p_of_search(winner_log_p, looks_);
-    if (p > options_.false_alarm || !adopt(winner_fit.parameters)) return false;
+    if (p > options_.false_alarm || !adopt(with_winner)) return false;
     chosen_.push_back(winner->candidate);
     p_values_.push_back(p);
     return true;
@@ -231,20 +271,27 @@ class Search {
     const Eigen::MatrixXd beside = slow_functions(input_.log);
     const EnlargedParameters& model = stage_.fit.parameters;
     // The noise that was handed in may have been estimated beside more than the model.
-    const Stage plain = settle_noise(input_, model, nullptr, &stage_.noise);
-    Stage rich = settle_noise(input_, model, nullptr, &stage_.noise, beside);
+    PerAxis<PooledNoise> plain = stage_.noise;
+    Stage rich;
+    parallel_for(2, [&](std::size_t which) {
+      if (which == 0) {
+        rich = settle_noise(input_, model, {}, &stage_.noise, beside);
+      } else if (!noise_is_own_) {
+        plain = settle_noise(input_, model, {}, &stage_.noise).noise;
+      }
+    });
     PerAxis<bool> worth_a_look{};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const double gain = plain.noise[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
+      const double gain = plain[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
       worth_a_look[i] =
           chi_squared_tail(std::max(0.0, gain), static_cast<double>(beside.cols())) < kWorthALook;
     }
     if (std::none_of(worth_a_look.begin(), worth_a_look.end(), [](bool b) { return b; }))
       return false;
     rich.fit = fit_enlarged(input_.log, rich.observed, rich.whitening, model);
-    const CandidateResponses responses =
+    const CandidateResponses beside_slow =
         candidate_responses(input_.log, list_, rich.whitening, rich.fit.parameters);
-    const CandidateGains gains(responses, rich.fit);
+    const CandidateGains gains(beside_slow, rich.fit);
     std::vector<Scored> ranked = screen(list_, gains, gains.of(rich.fit.whitened_residual).col(0));
     std::erase_if(ranked, [&](const Scored& s) {
       const Candidate& c = list_.candidates[s.candidate];
@@ -252,15 +299,21 @@ class Search {
              std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c) ||
              !is_slow(c, beside);
     });
+    std::vector<Stage> stages(std::min(kRefined, ranked.size()));
+    parallel_for(stages.size(), [&](std::size_t k) {
+      const Candidate& candidate = list_.candidates[ranked[k].candidate];
+      KnownNoise known = all_of(plain);
+      known[candidate.axis] = nullptr;
+      stages[k] = settle(input_, with_effect(model, candidate.active()), known, &rich.noise);
+    });
     const Scored* winner = nullptr;
     EnlargedParameters with_winner;
     double winner_score = std::numeric_limits<double>::infinity(), winner_log_p = 0;
-    for (std::size_t k = 0; k < std::min(kRefined, ranked.size()); ++k) {
+    for (std::size_t k = 0; k < stages.size(); ++k) {
       const Candidate& candidate = list_.candidates[ranked[k].candidate];
-      const Stage with =
-          settle(input_, with_effect(model, candidate.active()), nullptr, &rich.noise);
+      const Stage& with = stages[k];
       if (!with.fit.determined) continue;
-      const double gain = plain.noise[candidate.axis].likelihood_deviance -
+      const double gain = plain[candidate.axis].likelihood_deviance -
                           with.noise[candidate.axis].likelihood_deviance;
       const double log_p = log_chi_squared_tail(gain, gains.dof(ranked[k].candidate));
       const double score = log_p + (ranked[k].score - ranked[k].log_p);
@@ -317,7 +370,7 @@ class Search {
 
   /// An effect stands in the model once; a second pose, slip or step is another matter.
   bool is_chosen(const Candidate& candidate) const {
-    if (candidate.effect->certain()) return true;  // in the model from the start
+    if (candidate.effect->certain(input_.log)) return true;  // in the model from the start
     return !candidate.effect->repeats() &&
            std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
              return list_.candidates[k].effect == candidate.effect &&
@@ -342,7 +395,7 @@ class Search {
   /// What a newcomer has made superfluous goes.
   void drop_superfluous() {
     for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
-      if (list_.candidates[chosen_[k]].effect->certain()) continue;
+      if (list_.candidates[chosen_[k]].effect->certain(input_.log)) continue;
       const EnlargedFit without = fit_without({k});
       if (!without.determined || p_of_removal(without) < options_.false_alarm) continue;
       if (!adopt(without.parameters)) continue;
@@ -363,63 +416,83 @@ class Search {
   bool exchange_one() {
     if (chosen_.empty() || exchanges_ == kMostExchanges) return false;
     ++exchanges_;
-    const CandidateResponses responses =
-        candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
     std::vector<std::vector<std::size_t>> subsets;
     for (std::size_t k = 0; k < chosen_.size(); ++k) subsets.push_back({k});
     for (std::size_t k = 0; k < chosen_.size(); ++k)
       for (std::size_t l = k + 1; l < chosen_.size(); ++l) subsets.push_back({k, l});
-    for (const std::vector<std::size_t>& subset : subsets) {
-      if (std::any_of(subset.begin(), subset.end(), [&](std::size_t k) {
-            return list_.candidates[chosen_[k]].effect->certain();
-          }))
-        continue;
-      const EnlargedFit without = fit_without(subset);
-      if (!without.determined) continue;
-      double spent = 0;
-      for (const std::size_t k : subset) spent += price(chosen_[k], std::max(1, dof_of(k)));
-      const CandidateGains gains(responses, without);
-      const std::vector<Scored> ranked =
-          screen(list_, gains, gains.of(without.whitened_residual).col(0));
-      constexpr std::size_t kRefined = 4;
-      constexpr double kClearly = 2;
-      for (std::size_t r = 0; r < std::min(kRefined, ranked.size()); ++r) {
-        const std::size_t candidate = ranked[r].candidate;
-        if (subset.size() == 1 &&
-            list_.candidates[candidate].family ==
-                list_.candidates[chosen_[subset.front()]].family &&
-            list_.candidates[candidate].hypothesis.p ==
-                list_.candidates[chosen_[subset.front()]].hypothesis.p)
-          continue;
-        if (is_chosen(list_.candidates[candidate]) &&
-            std::none_of(subset.begin(), subset.end(), [&](std::size_t k) {
-              return list_.candidates[chosen_[k]].effect == list_.candidates[candidate].effect;
-            }))
-          continue;
-        const EnlargedFit with = fit_with(without.parameters, list_.candidates[candidate].active());
-        if (!with.determined) continue;
-        const double cost = with.chi2 + price(candidate, std::max(1, gains.dof(candidate)));
-        if (!(cost < stage_.fit.chi2 + spent - kClearly)) continue;
-        const double p = p_of_search(
-            log_p_of(candidate, without.chi2 - with.chi2, gains.dof(candidate), with), looks_);
-        if (p > options_.false_alarm || !adopt(with.parameters)) continue;
-        for (auto k = subset.rbegin(); k != subset.rend(); ++k) {
+    std::erase_if(subsets, [&](const std::vector<std::size_t>& subset) {
+      return std::any_of(subset.begin(), subset.end(), [&](std::size_t k) {
+        return list_.candidates[chosen_[k]].effect->certain(input_.log);
+      });
+    });
+    responses();
+    std::vector<std::vector<Exchange>> exchanges(subsets.size());
+    parallel_for(subsets.size(), [&](std::size_t s) { exchanges[s] = exchanges_for(subsets[s]); });
+    for (std::size_t s = 0; s < subsets.size(); ++s) {
+      for (const Exchange& exchange : exchanges[s]) {
+        if (!adopt(exchange.parameters)) continue;
+        for (auto k = subsets[s].rbegin(); k != subsets[s].rend(); ++k) {
           chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(*k));
           p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(*k));
         }
-        chosen_.push_back(candidate);
-        p_values_.push_back(p);
+        chosen_.push_back(exchange.candidate);
+        p_values_.push_back(exchange.p);
         return true;
       }
     }
     return false;
   }
 
+  /// One candidate in the place of some of the model's effects.
+  struct Exchange {
+    std::size_t candidate;
+    double p;
+    EnlargedParameters parameters;
+  };
+
+  /// Those that are worth their price, likeliest first. Precondition: responses() is up to date.
+  std::vector<Exchange> exchanges_for(const std::vector<std::size_t>& subset) const {
+    constexpr std::size_t kRefined = 4;
+    constexpr double kClearly = 2;
+    std::vector<Exchange> exchanges;
+    const EnlargedFit without = fit_without(subset);
+    if (!without.determined) return exchanges;
+    double spent = 0;
+    for (const std::size_t k : subset) spent += price(chosen_[k], std::max(1, dof_of(k)));
+    const CandidateGains gains(*responses_, without);
+    const std::vector<Scored> ranked =
+        screen(list_, gains, gains.of(without.whitened_residual).col(0));
+    for (std::size_t r = 0; r < std::min(kRefined, ranked.size()); ++r) {
+      const std::size_t index = ranked[r].candidate;
+      const Candidate& candidate = list_.candidates[index];
+      const Candidate& replaced = list_.candidates[chosen_[subset.front()]];
+      if (subset.size() == 1 && candidate.family == replaced.family &&
+          candidate.hypothesis.p == replaced.hypothesis.p)
+        continue;
+      if (is_chosen(candidate) && std::none_of(subset.begin(), subset.end(), [&](std::size_t k) {
+            return list_.candidates[chosen_[k]].effect == candidate.effect;
+          }))
+        continue;
+      const EnlargedFit with = fit_with(without.parameters, candidate.active());
+      if (!with.determined) continue;
+      const double cost = with.chi2 + price(index, std::max(1, gains.dof(index)));
+      if (!(cost < stage_.fit.chi2 + spent - kClearly)) continue;
+      const double p =
+          p_of_search(log_p_of(index, without.chi2 - with.chi2, gains.dof(index), with), looks_);
+      if (p <= options_.false_alarm) exchanges.push_back({index, p, with.parameters});
+    }
+    return exchanges;
+  }
+
   SearchResult result() {
     SearchResult result;
-    for (std::size_t k = 0; k < chosen_.size(); ++k)
-      result.evidence.push_back(
-          {list_.candidates[chosen_[k]], fit_without({k}).chi2 - stage_.fit.chi2, p_values_[k]});
+    result.evidence.resize(chosen_.size());
+    parallel_for(chosen_.size(), [&](std::size_t k) {
+      result.evidence[k] = {list_.candidates[chosen_[k]], fit_without({k}).chi2 - stage_.fit.chi2,
+                            p_values_[k]};
+    });
+    responses();
+    result.responses = std::move(*responses_);
     result.fit = std::move(stage_.fit);
     result.observed = std::move(stage_.observed);
     result.own_V2 = std::move(stage_.own_V2);
@@ -435,6 +508,8 @@ class Search {
   const CandidateList& list_;
   const SearchOptions& options_;
   Stage stage_;
+  bool noise_is_own_ = false;  ///< of the stage: estimated beside its model and nothing else
+  std::optional<CandidateResponses> responses_;
   std::vector<std::size_t> chosen_;  ///< candidates, in the order of the model's effects
   std::vector<double> p_values_;
   std::vector<std::size_t> dropped_;  ///< families

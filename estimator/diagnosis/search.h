@@ -49,7 +49,8 @@ struct SearchResult {
   PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
   PerAxis<PooledNoise> noise;       ///< re-estimated under the final model
   PoseWhitening whitening;
-  double p_best_rest = 1;  ///< p-value of the best candidate that was not taken
+  CandidateResponses responses;  ///< of the candidates beside the final model
+  double p_best_rest = 1;        ///< p-value of the best candidate that was not taken
 };
 
 /// Deterministic in input and options.

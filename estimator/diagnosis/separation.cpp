@@ -16,7 +16,6 @@ namespace {
 using Stop = SeparatingPlan::Stop;
 using Eigen::Index;
 
-constexpr double kDeg = 180 / std::numbers::pi;
 constexpr double kDecided = 25;     ///< 5 standard deviations, squared
 constexpr double kRegular = 1e-10;  ///< of information that is scaled to a unit diagonal
 constexpr std::size_t kLengths[] = {6, 12, 24, 48, 96};
@@ -35,18 +34,15 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
   for (const Stop& stop : stops) {
     const Visit before = longer.visits.back();
     Visit visit = before;
-    visit.delta_rad = stop.delta_deg / kDeg;
-    visit.h_rad = stop.h_deg / kDeg;
+    visit.delta_rad = stop.delta_deg * effect::kRadPerDeg;
+    visit.h_rad = stop.h_deg * effect::kRadPerDeg;
     visit.count = count;
     visit.step_s = first.step_s;
     const double longer_s =
         first.step_s * (static_cast<double>(count) - static_cast<double>(first.count));
     visit.t_arrival_s = before.t_arrival_s + cycle_s + std::max(longer_s, 0.0);
     visit.t_mean_s = visit.t_arrival_s + 0.5 * first.step_s * (static_cast<double>(count) - 1);
-    const double commanded = visit.delta_rad - before.delta_rad;
-    const double turn[] = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
-    for (std::size_t way = 0; way < visit.delta_direction.size(); ++way)
-      if (std::abs(turn[way]) > 1e-9) visit.delta_direction[way] = turn[way] > 0 ? 1 : -1;
+    visit.delta_direction = direction_after(before, visit.delta_rad);
     if (!longer.contrasts.contains(count))
       longer.contrasts.emplace(count, contrasts_of(visit, log.line));
     longer.visits.push_back(std::move(visit));
@@ -133,36 +129,22 @@ Eigen::MatrixXd numeric_rows(const VisitLog& log, const NewRows& rows,
   return jacobian;
 }
 
-bool is_within_dwell(const EnlargedParameters& model) {
-  return std::any_of(model.effects.begin(), model.effects.end(),
-                     [](const ActiveEffect& active) { return active.effect->within_dwell(); });
-}
-
 class Design {
  public:
   Design(const SearchInput& input, const SearchResult& result,
          const std::vector<Alternative>& rivals)
-      : log_(input.log), result_(result), within_dwell_(is_within_dwell(result.fit.parameters)) {
-    const auto found_V = predict_means_V(log_, result.fit.parameters);
-    const auto found_dwell_V = predict_dwells_V(log_, result.fit.parameters);
+      : log_(input.log),
+        result_(result),
+        within_dwell_(has_effect_within_dwell(result.fit.parameters)) {
+    const Eigen::VectorXd found_V = predict_stacked_V(log_, result.fit.parameters);
     for (const Alternative& rival : rivals) {
       Contest contest;
       contest.rival = &rival.fit.parameters;
-      within_dwell_ = within_dwell_ || is_within_dwell(rival.fit.parameters);
+      within_dwell_ = within_dwell_ || has_effect_within_dwell(rival.fit.parameters);
       contest.scale = rival.fit.whitened_jacobian.colwise().norm().cwiseInverse();
       const Eigen::MatrixXd J = rival.fit.whitened_jacobian * contest.scale.asDiagonal();
-      const auto rival_V = predict_means_V(log_, *contest.rival);
-      const auto rival_dwell_V = predict_dwells_V(log_, *contest.rival);
-      Eigen::VectorXd difference(stacked_rows(log_));
-      const Index n = std::ssize(log_.visits);
-      for (Index i = 0; i < 3; ++i) {
-        const auto axis = static_cast<std::size_t>(i);
-        difference.segment(i * n, n) = found_V[axis] - rival_V[axis];
-        const Index contrasts = log_.dwell_contrasts();
-        difference.segment((3 + i * contrasts) * n, contrasts * n) =
-            (found_dwell_V[axis] - rival_dwell_V[axis]).reshaped();
-      }
-      difference = result.whitening.apply(difference);
+      const Eigen::VectorXd difference =
+          result.whitening.apply(found_V - predict_stacked_V(log_, *contest.rival));
       contest.information = J.transpose() * J;
       contest.slope = J.transpose() * difference;
       contest.square = difference.squaredNorm();
@@ -392,10 +374,10 @@ std::string by_mounting(const ActiveEffect& found, const Alternative& rival, std
 HeadReach reach_of(const VisitLog& log) {
   HeadReach reach{1e9, -1e9, 1e9, -1e9};
   for (const Visit& visit : log.visits) {
-    reach.delta_min_deg = std::min(reach.delta_min_deg, kDeg * visit.delta_rad);
-    reach.delta_max_deg = std::max(reach.delta_max_deg, kDeg * visit.delta_rad);
-    reach.h_min_deg = std::min(reach.h_min_deg, kDeg * visit.h_rad);
-    reach.h_max_deg = std::max(reach.h_max_deg, kDeg * visit.h_rad);
+    reach.delta_min_deg = std::min(reach.delta_min_deg, visit.delta_rad / effect::kRadPerDeg);
+    reach.delta_max_deg = std::max(reach.delta_max_deg, visit.delta_rad / effect::kRadPerDeg);
+    reach.h_min_deg = std::min(reach.h_min_deg, visit.h_rad / effect::kRadPerDeg);
+    reach.h_max_deg = std::max(reach.h_max_deg, visit.h_rad / effect::kRadPerDeg);
   }
   return reach;
 }

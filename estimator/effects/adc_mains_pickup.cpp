@@ -6,8 +6,6 @@
 namespace plumbline {
 namespace {
 
-constexpr double kTurn_rad = 2 * std::numbers::pi;
-
 // Mains pickup: A·sin(2πft + φ) in every sample. It lives inside the dwell; in the means only what
 // averaging leaves of it is seen. A sampled line cannot be told from its alias, so f is at most
 // half the sampling rate.
@@ -32,7 +30,7 @@ class MainsPickup final : public Effect {
     const Visit& visit = input.at();
     const auto n = static_cast<double>(visit.count);
     // Mean of n equally spaced values of a sine: Dirichlet's kernel about the middle of the dwell.
-    const double half = 0.5 * kTurn_rad * p[1] * visit.step_s;
+    const double half = 0.5 * effect::kTurn_rad * p[1] * visit.step_s;
     const double kernel =
         std::abs(std::sin(half)) < 1e-12 ? 1 : std::sin(n * half) / (n * std::sin(half));
     return kernel * sample_term_g(input, p, 0.5 * (n - 1) * visit.step_s);
@@ -46,7 +44,7 @@ class MainsPickup final : public Effect {
   double sample_term_g(const TermInput& input, const double* p,
                        double since_arrival_s) const override {
     const double turns = p[1] * (input.at().t_arrival_s + since_arrival_s) + p[2] / 360;
-    return p[0] * std::sin(kTurn_rad * turns);
+    return p[0] * std::sin(effect::kTurn_rad * turns);
   }
 };
 

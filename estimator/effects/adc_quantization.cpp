@@ -16,7 +16,8 @@ class Quantization final : public Effect {
             {"origin", "V", ParameterRole::index},
             {"noise", "V", ParameterRole::shape}};
   }
-  bool certain() const override { return true; }
+  // Against a declared step the codes prove a coarser one; without it they only suggest one.
+  bool certain(const VisitLog& log) const override { return log.adc.has_value(); }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     // Without a declared converter the smallest difference between two readings is its step.
     const std::optional<Lattice> lattice =

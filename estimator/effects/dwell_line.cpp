@@ -8,25 +8,24 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
-#include "estimator/effects/visit_log.h"
+#include "estimator/effects/effect.h"
 
 namespace plumbline {
 namespace {
 
-constexpr double kTurn_rad = 2 * std::numbers::pi;
 constexpr std::size_t kFewestSamples = 8;
 constexpr Eigen::Index kFewestDwells = 10;
 constexpr double kFalseAlarm = 1e-5;
 
 /// All dwells of one axis, side by side.
 struct Dwells {
-  Eigen::ArrayXd t_s;     ///< first sample of each, from the first of all
-  double origin_s = 0;    ///< of those times, on the clock of the run
-  double step_s = 0;      ///< between samples
-  double samples = 0;     ///< of all
-  Eigen::MatrixXd off_V;  ///< samples × dwells, without mean and without what changes slowly
-                          ///< within a dwell; a shorter dwell ends in zeros
-  Eigen::MatrixXd slow;   ///< step_contrasts() of the longest
+  Eigen::ArrayXd t_s;       ///< first sample of each, from the first of all
+  double origin_s = 0;      ///< of those times, on the clock of the run
+  double step_s = 0;        ///< between samples
+  double samples = 0;       ///< of all
+  Eigen::MatrixXd off_V;    ///< samples × dwells, without mean and without what changes slowly
+                            ///< within a dwell; a shorter dwell ends in zeros
+  Eigen::MatrixXd removed;  ///< orthonormal functions that the longest was freed of
   double run_s() const { return t_s(t_s.size() - 1); }
 };
 
@@ -44,15 +43,19 @@ Dwells dwells_of(const MeasurementSet& set, std::size_t axis) {
   if (poses.empty()) return dwells;
   dwells.origin_s = t_s[poses.front()->first];
   dwells.t_s.resize(std::ssize(poses));
-  dwells.slow = step_contrasts(longest);
-  dwells.off_V.setZero(static_cast<Eigen::Index>(longest), std::ssize(poses));
+  const auto rows = static_cast<Eigen::Index>(longest);
+  const Eigen::MatrixXd steps_of_longest = step_contrasts(longest);
+  dwells.removed.resize(rows, steps_of_longest.cols() + 1);
+  dwells.removed << steps_of_longest,
+      Eigen::VectorXd::Constant(rows, 1 / std::sqrt(static_cast<double>(longest)));
+  dwells.off_V.setZero(rows, std::ssize(poses));
   double steps = 0, spans_s = 0;
   for (Eigen::Index k = 0; k < dwells.t_s.size(); ++k) {
     const Pose& pose = *poses[static_cast<std::size_t>(k)];
     const auto n = static_cast<Eigen::Index>(pose.count);
     const Eigen::Map<const Eigen::VectorXd> u_V(set.samples.u_V[axis].data() + pose.first, n);
-    const Eigen::MatrixXd& contrasts =
-        slow.try_emplace(pose.count, step_contrasts(pose.count)).first->second;
+    if (!slow.contains(pose.count)) slow.emplace(pose.count, step_contrasts(pose.count));
+    const Eigen::MatrixXd& contrasts = slow.at(pose.count);
     Eigen::VectorXd off_V = u_V.array() - u_V.mean();
     off_V -= contrasts * (contrasts.transpose() * off_V);
     dwells.off_V.col(k).head(n) = off_V;
@@ -67,34 +70,34 @@ Dwells dwells_of(const MeasurementSet& set, std::size_t axis) {
 
 /// exp(−2πi·f·t)
 Eigen::ArrayXcd turning(double f_hz, const Eigen::ArrayXd& t_s) {
-  const Eigen::ArrayXd phase = -kTurn_rad * f_hz * t_s;
+  const Eigen::ArrayXd phase = -effect::kTurn_rad * f_hz * t_s;
   Eigen::ArrayXcd turned(t_s.size());
   turned.real() = phase.cos();
   turned.imag() = phase.sin();
   return turned;
 }
 
+/// Σ column·exp(−2πi·f·t) for each column of samples, from the first of them.
+Eigen::ArrayXcd along_columns(const Eigen::MatrixXd& columns, double step_s, double f_hz) {
+  const Eigen::ArrayXd within_s =
+      step_s *
+      Eigen::ArrayXd::LinSpaced(columns.rows(), 0, static_cast<double>(columns.rows() - 1));
+  const Eigen::VectorXcd turned = turning(f_hz, within_s);
+  Eigen::ArrayXcd sums(columns.cols());
+  sums.real() = (columns.transpose() * turned.real()).array();
+  sums.imag() = (columns.transpose() * turned.imag()).array();
+  return sums;
+}
+
 /// Σ off·exp(−2πi·f·t) over each dwell.
 Eigen::ArrayXcd components(const Dwells& dwells, double f_hz) {
-  const Eigen::ArrayXd within_s =
-      dwells.step_s * Eigen::ArrayXd::LinSpaced(dwells.off_V.rows(), 0,
-                                                static_cast<double>(dwells.off_V.rows() - 1));
-  const Eigen::VectorXcd turned = turning(f_hz, within_s);
-  Eigen::ArrayXcd sums(dwells.t_s.size());
-  sums.real() = (dwells.off_V.transpose() * turned.real()).array();
-  sums.imag() = (dwells.off_V.transpose() * turned.imag()).array();
-  return sums * turning(f_hz, dwells.t_s);
+  return along_columns(dwells.off_V, dwells.step_s, f_hz) * turning(f_hz, dwells.t_s);
 }
 
 /// Share of a sine of this frequency that is left when what is slow within a dwell is removed.
 double share_left(const Dwells& dwells, double f_hz) {
-  const Eigen::Index n = dwells.off_V.rows();
-  Dwells removed;
-  removed.step_s = dwells.step_s;
-  removed.off_V.resize(n, dwells.slow.cols() + 1);
-  removed.off_V << dwells.slow, Eigen::VectorXd::Constant(n, 1 / std::sqrt(static_cast<double>(n)));
-  removed.t_s.setZero(removed.off_V.cols());
-  return 1 - components(removed, f_hz).abs2().sum() / static_cast<double>(n);
+  return 1 - along_columns(dwells.removed, dwells.step_s, f_hz).abs2().sum() /
+                 static_cast<double>(dwells.off_V.rows());
 }
 
 /// Power of the dwells together at a frequency, as large as if nothing had been removed.
@@ -195,9 +198,10 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
   // What lies beyond half the sampling rate is its own mirror image.
   if (best_hz > nyquist_hz) best_hz = 2 * nyquist_hz - best_hz;
   const std::complex<double> sum = components(dwells, best_hz).sum();
-  const double phase = std::arg(sum) + 0.25 * kTurn_rad - kTurn_rad * best_hz * dwells.origin_s;
+  const double phase =
+      std::arg(sum) + 0.25 * effect::kTurn_rad - effect::kTurn_rad * best_hz * dwells.origin_s;
   return DwellLine{best_hz, 2 * std::abs(sum) / (share_left(dwells, best_hz) * dwells.samples),
-                   phase - kTurn_rad * std::floor(phase / kTurn_rad)};
+                   phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad)};
 }
 
 }  // namespace plumbline

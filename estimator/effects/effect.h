@@ -76,7 +76,7 @@ class Effect {
   virtual double sample_term_g(const TermInput& input, const double* p,
                                double since_arrival_s) const;
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
-  virtual bool certain() const { return false; }
+  virtual bool certain(const VisitLog&) const { return false; }
   /// Whether it may stand in a model more than once for one axis: at another pose, say.
   virtual bool repeats() const { return false; }
   /// The same response by parameters as one would state them: positive amplitudes, angles within
@@ -94,6 +94,7 @@ class Effect {
 namespace effect {
 
 inline constexpr double kRadPerDeg = 0.017453292519943295;
+inline constexpr double kTurn_rad = 360 * kRadPerDeg;
 /// Typical sizes that a search starts from, small against 1 g.
 inline constexpr double kSmallTerm = 1e-3;
 inline constexpr double kSmallAngle_deg = 0.02;

@@ -109,6 +109,16 @@ Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<Dwe
   return contrasts;
 }
 
+std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
+  constexpr double kStill_rad = 1e-9;  // degrees that became radians and came back
+  std::array<int, 2> direction = before.delta_direction;
+  const double commanded = delta_rad - before.delta_rad;
+  const double turn[] = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
+  for (std::size_t way = 0; way < direction.size(); ++way)
+    if (std::abs(turn[way]) > kStill_rad) direction[way] = turn[way] > 0 ? 1 : -1;
+  return direction;
+}
+
 double VisitLog::step_V(std::size_t axis) const {
   if (coarser_lattice[axis]) return coarser_lattice[axis]->step_V;
   int missing = 0;
@@ -132,7 +142,6 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
   for (const Covariate& covariate : samples.covariates) {
     log.covariate_names.push_back(covariate.name);
   }
-  std::array<int, 2> direction{};
   for (const Pose& pose : set.poses) {
     assert(pose.count > 0);
     Visit visit;
@@ -147,13 +156,8 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     if (log.has_temperature) {
       visit.temperature_K = mean_of(samples.temp_C, pose) - description.reference_C;
     }
-    if (!log.visits.empty()) {
-      const double commanded = visit.delta_rad - log.visits.back().delta_rad;
-      const double turn[] = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
-      for (std::size_t way = 0; way < direction.size(); ++way)
-        if (turn[way] != 0) direction[way] = turn[way] > 0 ? 1 : -1;
-    }
-    visit.delta_direction = direction;
+    if (!log.visits.empty())
+      visit.delta_direction = direction_after(log.visits.back(), visit.delta_rad);
     for (const Covariate& covariate : samples.covariates) {
       visit.covariate.push_back(mean_of(covariate.value, pose));
     }

@@ -64,6 +64,9 @@ struct VisitLog {
   double last_s() const { return visits.back().t_mean_s; }
 };
 
+/// Visit::delta_direction of a visit at `delta_rad` that comes next after `before`.
+std::array<int, 2> direction_after(const Visit& before, double delta_rad);
+
 /// For what changes slowly within a dwell of `samples` samples: samples × 5, orthonormal columns of
 /// zero sum. They span the steps after 1/32, 1/16 … 1/2 of the dwell, finest where transients after
 /// a move are fastest; columns that a short dwell cannot resolve are zero.

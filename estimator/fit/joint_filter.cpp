@@ -5,6 +5,8 @@
 #include <numbers>
 #include <optional>
 
+#include "estimator/noise/square.h"
+
 namespace plumbline {
 namespace {
 
@@ -14,7 +16,6 @@ constexpr Index kAxes = static_cast<Index>(kAxisCount);
 constexpr Index kDrifts =
     2 * kAxes;  ///< flicker and random walk of each axis, after the parameters
 
-double squared(double value) { return value * value; }
 double coefficient(const NoiseTerm& term) { return term.present ? term.value : 0.0; }
 
 /// What an axis's drifts do between visits.
@@ -30,8 +31,8 @@ Drift drift_of(const NoiseModel& noise, const JointFilterOptions& options) {
   constexpr double kGaussMarkovPeak = 0.6174;
   const double plateau_V =
       coefficient(noise.B) * std::sqrt(2 * std::numbers::ln2 / std::numbers::pi);
-  return {squared(plateau_V / kGaussMarkovPeak), 1 / options.flicker_correlation_s,
-          squared(coefficient(noise.K)), noise.walk_decay_per_s};
+  return {square(plateau_V / kGaussMarkovPeak), 1 / options.flicker_correlation_s,
+          square(coefficient(noise.K)), noise.walk_decay_per_s};
 }
 
 /// One pass: the parameters counted from where the readings are linearised, so that they keep their
@@ -83,7 +84,7 @@ class Pass {
     const Eigen::VectorXd gain = Ph / variance;
     // The prior dominates as long as the parameters are less certain than the reading.
     if (axis && slope.dot(Ph.head(parameters_)) < 0.5 * variance) {
-      nis_ += squared(innovation_V) / variance;
+      nis_ += square(innovation_V) / variance;
       ++counted_;
     }
     x_ += gain * innovation_V;
@@ -124,7 +125,7 @@ Eigen::VectorXd prior_sd(const JointReadings& readings, const Eigen::MatrixXd& s
                          .colwise()
                          .sum()
                          .transpose() /
-                     squared(sd_V(d));
+                     square(sd_V(d));
   }
   return kWide * information.cwiseSqrt().cwiseInverse();
 }
@@ -160,7 +161,7 @@ JointEstimate run_joint_filter(const JointReadings& readings, const JointModel& 
           if (about.slope.row(at).isZero(0)) continue;  // says nothing about any parameter
           filter.update(about.slope.row(at), std::nullopt,
                         readings.dwell_V[axis](k, d) - about.value_V(at),
-                        squared(readings.dwell_sd_V[axis](d)));
+                        square(readings.dwell_sd_V[axis](d)));
         }
       }
       filter.symmetrise();

@@ -63,8 +63,8 @@ class Random {
 };
 
 /// A matrix whose product with itself transposed is `covariance`, semidefinite or not quite.
-Eigen::Matrix4d root_of(const Eigen::Matrix4d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(covariance);
+Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
 }
 
@@ -78,7 +78,38 @@ struct Model {
   PerAxis<Eigen::VectorXd> rounding_half_V;
   PerAxis<Eigen::Matrix4d> noise_root;
   PerAxis<bool> rounds{};
+  /// Whether angles of these uncertainties bend the outputs enough to be felt. If not, what they do
+  /// to the parameters is Gaussian, 12 × 12, and is drawn as such instead of angle by angle.
+  bool bends = false;
+  Eigen::MatrixXd angle_root;
 };
+
+/// Twelve parameters' deviations by one of the slopes of each pose, 12 × n.
+Eigen::MatrixXd through_gain(const Model& model, Eigen::Index slope) {
+  Eigen::MatrixXd shift(kParameters, std::ssize(model.input.poses));
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    shift.middleRows<4>(4 * static_cast<Eigen::Index>(i)) =
+        model.input.axis[i].gain * model.slope[i].col(slope).asDiagonal();
+  return shift;
+}
+
+void decide_on_angles(Model& model) {
+  constexpr double kFelt = 1e-3;  // of what the straight part does
+  const double u_delta = model.u_delta_rad, u_h = model.u_h_rad;
+  const Eigen::MatrixXd by_delta = u_delta * through_gain(model, 0),
+                        by_h = u_h * through_gain(model, 1),
+                        by_delta2 = u_delta * u_delta * through_gain(model, 2),
+                        by_both = u_delta * u_h * through_gain(model, 3),
+                        by_h2 = u_h * u_h * through_gain(model, 4);
+  const Eigen::MatrixXd covariance = by_delta * by_delta.transpose() + by_h * by_h.transpose();
+  model.angle_root = root_of(covariance);
+  const Eigen::VectorXd mean = by_delta2.rowwise().sum() + by_h2.rowwise().sum();
+  const Eigen::VectorXd variance = 2 * by_delta2.rowwise().squaredNorm() +
+                                   by_both.rowwise().squaredNorm() +
+                                   2 * by_h2.rowwise().squaredNorm();
+  model.bends =
+      ((mean.cwiseAbs2() + variance).array() > kFelt * kFelt * covariance.diagonal().array()).any();
+}
 
 Model make_model(const PropagationInput& input) {
   constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
@@ -91,6 +122,8 @@ Model make_model(const PropagationInput& input) {
               {},
               {},
               {},
+              {},
+              false,
               {}};
   const auto n = std::ssize(input.poses);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -115,6 +148,7 @@ Model make_model(const PropagationInput& input) {
     model.rounds[i] = model.rounding_half_V[i].maxCoeff() > 0;
     model.noise_root[i] = root_of(axis.noise);
   }
+  decide_on_angles(model);
   return model;
 }
 
@@ -124,10 +158,15 @@ Eigen::MatrixXd trials(const Model& model, std::uint64_t seed, std::size_t count
   const auto n = std::ssize(model.input.poses);
   Eigen::MatrixXd result(kParameters, static_cast<Eigen::Index>(count));
   Eigen::ArrayXd error_V(n), delta_rad = Eigen::ArrayXd::Zero(n), h_rad = delta_rad;
+  Eigen::VectorXd by_angles = Eigen::VectorXd::Zero(kParameters), twelve = by_angles;
   const bool turns = model.u_delta_rad > 0 || model.u_h_rad > 0;
   for (Eigen::Index trial = 0; trial < result.cols(); ++trial) {
     const double relative = model.u_gamma * random.normal();
-    for (Eigen::Index k = 0; turns && k < n; ++k) {
+    if (turns && !model.bends) {
+      for (double& value : twelve) value = random.normal();
+      by_angles = model.angle_root * twelve;
+    }
+    for (Eigen::Index k = 0; model.bends && k < n; ++k) {
       delta_rad(k) = model.u_delta_rad * random.normal();
       h_rad(k) = model.u_h_rad * random.normal();
     }
@@ -135,9 +174,10 @@ Eigen::MatrixXd trials(const Model& model, std::uint64_t seed, std::size_t count
       const PropagationAxis& axis = model.input.axis[i];
       Eigen::Vector4d normals;
       for (Eigen::Index j = 0; j < 4; ++j) normals(j) = random.normal();
-      Eigen::Vector4d estimate = axis.value + model.noise_root[i] * normals;
+      Eigen::Vector4d estimate = axis.value + model.noise_root[i] * normals +
+                                 by_angles.segment<4>(4 * static_cast<Eigen::Index>(i));
       const Eigen::MatrixXd& s = model.slope[i];
-      if (turns) {
+      if (model.bends) {
         error_V = delta_rad *
                       (s.col(0).array() + s.col(2).array() * delta_rad + s.col(3).array() * h_rad) +
                   h_rad * (s.col(1).array() + s.col(4).array() * h_rad);
@@ -148,7 +188,7 @@ Eigen::MatrixXd trials(const Model& model, std::uint64_t seed, std::size_t count
         for (Eigen::Index k = 0; k < n; ++k)
           error_V(k) += model.rounding_half_V[i](k) * random.symmetric();
       }
-      if (turns || model.rounds[i]) estimate += axis.gain.lazyProduct(error_V.matrix());
+      if (model.bends || model.rounds[i]) estimate += axis.gain.lazyProduct(error_V.matrix());
       // The outputs came from g(1 + e), the design says g: the sensitivities come out too large.
       estimate.head<3>() += relative * estimate.head<3>();
       result.block<4, 1>(4 * static_cast<Eigen::Index>(i), trial) = estimate - axis.value;

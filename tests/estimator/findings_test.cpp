@@ -55,6 +55,15 @@ TEST(DetectionLimits, OfAQuadraticIsWhatPlainLeastSquaresSays) {
   EXPECT_EQ(limit->best, limit->limit);
 }
 
+TEST(Findings, SingleReadingsOfAnUndeclaredConverterProveNoStep) {
+  SyntheticOptions options;
+  options.samples_per_pose = 1;  // nothing is known of the noise within a dwell
+  SyntheticRun data = synthetic_run(3, {24, -5.0, 0.0}, options);
+  data.description.adc.reset();
+  const Calibration result = calibrated(data);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
+}
+
 TEST(DetectionLimits, StandForEverythingThatWasNotFound) {
   const SyntheticRun data = synthetic_run(2, kSixteenBits);
   const Calibration result = calibrated(data);

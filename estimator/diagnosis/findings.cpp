@@ -1,0 +1,211 @@
+#include "estimator/diagnosis/findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "estimator/diagnosis/alternatives.h"
+#include "estimator/diagnosis/detection_limits.h"
+#include "estimator/diagnosis/separation.h"
+#include "estimator/effects/smooth_term.h"
+
+namespace plumbline {
+namespace {
+
+std::vector<EffectParameter> report_parameters(const VisitLog& log,
+                                               const EnlargedEstimate& estimate,
+                                               std::size_t effect) {
+  Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
+  for (std::size_t e = 0; e < effect; ++e) {
+    const auto& free = estimate.parameters.effects[e].free;
+    row += std::count(free.begin(), free.end(), true);
+  }
+  const ActiveEffect& active = estimate.parameters.effects[effect];
+  const auto infos = active.effect->parameters();
+  std::vector<double> values = active.p;
+  active.effect->normalise(values);
+  std::vector<EffectParameter> reported;
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    // An amplitude that this hypothesis leaves out is no result.
+    if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
+    EffectParameter parameter{infos[k].name, std::nullopt, values[k], 0, infos[k].unit};
+    if (active.free[k]) {
+      parameter.estimated = true;
+      parameter.u = std::sqrt(std::max(estimate.covariance(row, row), 0.0));
+      ++row;
+    }
+    if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
+    if (infos[k].role == ParameterRole::index && infos[k].unit == "s") {
+      // The instant lies somewhere between the last sample before and the first one after.
+      for (std::size_t v = 1; v < log.visits.size(); ++v) {
+        if (log.visits[v].t_arrival_s != active.p[k]) continue;
+        const Visit& before = log.visits[v - 1];
+        const double end_s =
+            before.t_arrival_s + before.step_s * (static_cast<double>(before.count) - 1);
+        parameter.value = 0.5 * (end_s + active.p[k]);
+        parameter.u = (active.p[k] - end_s) / std::sqrt(12.0);
+      }
+    }
+    reported.push_back(std::move(parameter));
+  }
+  return reported;
+}
+
+/// What else effect `index` could be, and what would tell.
+void add_rivals(const SearchInput& input, const CandidateList& list, const SearchResult& search,
+                const HeadReach& reach, std::size_t index, FoundEffect& entry) {
+  const std::vector<Alternative> rivals = find_alternatives(input, list, search, index);
+  for (const Alternative& rival : rivals) {
+    auto& names = entry.alternatives;
+    if (std::find(names.begin(), names.end(), rival.name) == names.end())
+      names.push_back(rival.name);
+  }
+  const Separation separation = separate(input, search, index, rivals, reach);
+  if (separation.words.empty() || entry.separate_by == separation.words) return;
+  entry.separate_by += (entry.separate_by.empty() ? "" : "; ") + separation.words;
+  // Further axes of the same effect rarely need other poses: the longest plan serves.
+  if (separation.plan.stops.size() > entry.separating_plan.stops.size())
+    entry.separating_plan = separation.plan;
+}
+
+std::string number(double value, const char* format) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string describe(const FoundEffect& effect) {
+  std::string text = effect.id + " (";
+  for (std::size_t axis : effect.axes)
+    text += std::string(axis == effect.axes.front() ? "" : ", ") + kAxisName[axis];
+  text += "): ";
+  for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
+    const EffectParameter& p = effect.parameters[k];
+    text += (k == 0 ? "" : ", ") + p.name + " = " + number(p.value, "%.4g");
+    if (p.u > 0) text += " ± " + number(p.u, "%.2g");
+    if (!p.unit.empty()) text += " " + p.unit;
+  }
+  return text;
+}
+
+/// The same weakness of several axes is one effect with several axes, and so are several poses that
+/// went wrong each by itself.
+bool shares_an_entry(const Effect& effect) {
+  return effect.subject() == Subject::sensor || effect.concerns_one_visit();
+}
+
+/// One entry per id, axes and parameters together; smooth terms apart.
+struct Reported {
+  std::vector<FoundEffect> effects;
+  std::vector<UnlistedStructure> unlisted;
+};
+
+Reported report(const VisitLog& log, const EnlargedEstimate& estimate) {
+  Reported reported;
+  for (std::size_t e = 0; e < estimate.parameters.effects.size(); ++e) {
+    const ActiveEffect& active = estimate.parameters.effects[e];
+    std::vector<EffectParameter> parameters = report_parameters(log, estimate, e);
+    if (const auto* term = dynamic_cast<const SmoothTerm*>(active.effect)) {
+      reported.unlisted.push_back({term->driver(), to_string(term->form()), axes_of(active),
+                                   term->shape(), std::move(parameters), 1, 0});
+      continue;
+    }
+    std::vector<FoundEffect>& found = reported.effects;
+    const std::string id = active.effect->id();
+    auto entry = found.end();
+    if (shares_an_entry(*active.effect)) {
+      entry = std::find_if(found.begin(), found.end(),
+                           [&](const FoundEffect& f) { return f.id == id; });
+    }
+    if (entry == found.end()) {
+      FoundEffect fresh;
+      fresh.id = id;
+      fresh.p_value = 0;
+      fresh.definition = active.effect->definition();
+      entry = found.insert(found.end(), std::move(fresh));
+    }
+    for (std::size_t axis : axes_of(active)) {
+      if (std::find(entry->axes.begin(), entry->axes.end(), axis) == entry->axes.end()) {
+        entry->axes.push_back(axis);
+      }
+    }
+    std::sort(entry->axes.begin(), entry->axes.end());
+    for (EffectParameter& p : parameters) entry->parameters.push_back(std::move(p));
+  }
+  return reported;
+}
+
+void attach(const std::vector<EffectParameter>& filtered, std::vector<EffectParameter>& reported) {
+  for (std::size_t k = 0; k < reported.size(); ++k) {
+    if (!reported[k].estimated) continue;
+    const double value = filtered[k].value, u = filtered[k].u;
+    const double difference = std::abs(value - reported[k].value);
+    reported[k].filter = {value, u, difference / (2 * std::hypot(u, reported[k].u))};
+  }
+}
+
+}  // namespace
+
+Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
+                            const SearchResult& search, const HeadReach& reach) {
+  Diagnosis diagnosis;
+  auto [effects, unlisted] = report(input.log, search.fit);
+  diagnosis.not_found = detection_limits(input, list, search);
+  std::size_t next_unlisted = 0;
+  for (std::size_t e = 0; e < search.evidence.size(); ++e) {
+    const Effect& effect = *search.evidence[e].candidate.effect;
+    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
+      unlisted[next_unlisted++].p_value = search.evidence[e].p_value;
+      continue;
+    }
+    for (FoundEffect& entry : effects) {
+      if (entry.id != effect.id()) continue;
+      entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
+      if (!effect.certain(input.log)) add_rivals(input, list, search, reach, e, entry);
+    }
+  }
+  diagnosis.effects = std::move(effects);
+  diagnosis.unlisted = std::move(unlisted);
+  diagnosis.p_value =
+      search.evidence.empty() ? search.p_best_rest : search.evidence.front().p_value;
+  if (search.evidence.empty()) {
+    diagnosis.verdict = Verdict::clean;
+    diagnosis.reason = "no effect stands out of the identified noise";
+    return diagnosis;
+  }
+  diagnosis.verdict = Verdict::explained;
+  for (const FoundEffect& effect : diagnosis.effects) {
+    diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ") + describe(effect);
+  }
+  for (const UnlistedStructure& structure : diagnosis.unlisted) {
+    diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ");
+    diagnosis.reason += "unlisted: a " + structure.shape + " in " + structure.driver +
+                        " changes the " + structure.form;
+  }
+  return diagnosis;
+}
+
+void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosis& diagnosis) {
+  const Reported filtered = report(log, filter);
+  for (std::size_t k = 0; k < filtered.effects.size(); ++k)
+    attach(filtered.effects[k].parameters, diagnosis.effects[k].parameters);
+  for (std::size_t k = 0; k < filtered.unlisted.size(); ++k)
+    attach(filtered.unlisted[k].parameters, diagnosis.unlisted[k].parameters);
+}
+
+void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
+                  Diagnosis& diagnosis) {
+  std::size_t unlisted = 0;
+  for (std::size_t e = 0; e < evidence.size() && e < gains.size(); ++e) {
+    const Effect& effect = *evidence[e].candidate.effect;
+    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
+      diagnosis.unlisted[unlisted++].heldout_gain = gains[e];
+      continue;
+    }
+    for (FoundEffect& entry : diagnosis.effects) {
+      if (entry.id == effect.id()) entry.heldout_gain = std::max(entry.heldout_gain, gains[e]);
+    }
+  }
+}
+
+}  // namespace plumbline

@@ -1,0 +1,25 @@
+// What a search found, in words and numbers: effects, rivals, limits of what was not found.
+#pragma once
+
+#include <vector>
+
+#include "estimator/calibrate.h"
+#include "estimator/diagnosis/search.h"
+
+namespace plumbline {
+
+/// The diagnosis of the search's final model: effects with what else they could be and what would
+/// decide between them, structures that are not on the list, limits of what was not found, verdict.
+/// `list` is that of the search; `reach` bounds the poses that are suggested. Held-out gains and
+/// the filter's estimates are attached to it afterwards.
+Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
+                            const SearchResult& search, const HeadReach& reach);
+
+/// Adds the filter's estimate of the same model to every parameter, with E_n between them.
+void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosis& diagnosis);
+
+/// Adds the shares of the held-out excess that the effects remove, one for each evidence.
+void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
+                  Diagnosis& diagnosis);
+
+}  // namespace plumbline
