@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
 # Cuts the power of a virtual machine while it commits poses to a database on ext4.
-#   power.sh BUILD_DIR CUTS
-# Each boot replays the file system's journal, checks every pose that was acknowledged before the cuts
-# so far, and goes on committing until its power is cut at a random moment.
+#   power.sh BUILD_DIR CUTS [LANES]
+# After each cut the file system's journal is replayed, every pose checked that was acknowledged before
+# the cuts so far, and committing goes on until the power is cut at a random moment. The machine is
+# saved once, before it has seen the disk's content, and starts from there. LANES machines beside each other.
 set -euo pipefail
 build=$(realpath "$1")
 cuts=$2
+lanes=${3:-1}
 patience=${PATIENCE_S:-600}0 # tenths of a second for a boot
 work=$build/vm
 skip() {
@@ -52,63 +54,103 @@ cat >"$root/init" <<'INIT'
 export PATH=/bin:/sbin
 mount -t proc proc /proc; mount -t sysfs sys /sys; mount -t devtmpfs dev /dev 2>/dev/null
 for module in /modules/*.ko; do insmod "$module" 2>/dev/null; done
+# Nothing of the disk is remembered: it is another one when the machine goes on.
+blockdev --flushbufs /dev/vda; echo 3 >/proc/sys/vm/drop_caches
+until [ "$word" = acknowledged ]; do
+  echo POWER-READY
+  read -t 1 word acknowledged
+done
+echo POWER-ON
 mount -t ext4 /dev/vda /data || { echo "POWER-FAULT no file system"; poweroff -f; }
-acknowledged=$(sed 's/.*acknowledged=\([-0-9]*\).*/\1/' /proc/cmdline)
 power_writer /data/run.db "$acknowledged"
 poweroff -f
 INIT
 chmod +x "$root/init"
 (cd "$root" && find . -print0 | cpio --null --quiet -o -H newc | gzip -1) >"$root.cpio.gz"
+
+# machine IMAGE MORE…: the same for saving and for going on.
+machine() {
+  local image=$1
+  shift
+  exec qemu-system-x86_64 -M q35 -m 256 -nographic -no-reboot -nodefaults -serial stdio \
+    -kernel "$vmlinuz" -initrd "$root.cpio.gz" -append "console=ttyS0 quiet panic=-1" \
+    -drive file="$image",format=raw,if=virtio,cache=writeback "$@"
+}
+
+# wait_for PATTERN FILE PID: until the pattern stands there, the process has ended, or patience has.
+wait_for() {
+  waited=0
+  until grep -aq "$1" "$2" || ! kill -0 "$3" 2>/dev/null; do
+    sleep 0.05
+    waited=$((waited + 1))
+    [ $waited -lt $((2 * patience)) ] || break
+  done
+}
+
 truncate -s 256M "$root.img"
 mkfs.ext4 -q -F "$root.img"
+mkfifo "$root.monitor.in" "$root.monitor.out"
+(machine "$root.img" -chardev pipe,id=monitor,path="$root.monitor" -mon monitor) \
+  </dev/null >"$root.console" 2>&1 &
+saved=$!
+wait_for 'POWER-READY' "$root.console" $saved
+printf 'migrate "exec:cat >%s"\nquit\n' "$root.state" >"$root.monitor.in"
+wait $saved || true
+if ! grep -aq 'POWER-READY' "$root.console" || [ ! -s "$root.state" ]; then
+  tail -5 "$root.console"
+  echo "battery-power: the virtual machine did not start"
+  exit 1
+fi
 
-acknowledged=-1
-lost=0
-done_cuts=0
-slow=0
-RANDOM=${SEED:-1}
-for ((cut = 1; cut <= cuts; ++cut)); do
-  : >"$root.console"
-  qemu-system-x86_64 -M q35 -m 256 -nographic -no-reboot -nodefaults -serial stdio \
-    -kernel "$vmlinuz" -initrd "$root.cpio.gz" \
-    -drive file="$root.img",format=raw,if=virtio,cache=writeback \
-    -append "console=ttyS0 quiet panic=-1 acknowledged=$acknowledged" </dev/null >"$root.console" 2>&1 &
-  machine=$!
-  # Every fifth cut comes while the guest starts, mounts and checks.
-  early=$((cut % 5 == 0))
-  if [ $early -eq 1 ]; then
-    waited_for='Booting\|POWER-FAULT'
-    after=$((RANDOM % 12))
-  else
-    waited_for='POWER-ACK\|POWER-FAULT'
-    after=$((RANDOM % 3))
-  fi
-  waited=0
-  until grep -aq "$waited_for" "$root.console" || ! kill -0 $machine 2>/dev/null; do
-    sleep 0.1
-    waited=$((waited + 1))
-    [ $waited -lt "$patience" ] || break
-  done
-  sleep "$after.$(printf %03d $((RANDOM % 1000)))"
-  kill -9 $machine 2>/dev/null || true
-  wait $machine 2>/dev/null || true
-  if grep -a 'POWER-FAULT' "$root.console"; then
-    lost=$((lost + 1))
-  elif [ $early -eq 0 ] && ! grep -aq 'POWER-CHECKED' "$root.console"; then
-    if [ $waited -ge "$patience" ] && [ $slow -lt 10 ]; then # a busy machine; says nothing
-      slow=$((slow + 1))
-      cut=$((cut - 1))
-      continue
+# lane NUMBER CUTS: a disk of its own, cut so many times. Its last line: cuts, poses, faults.
+lane() {
+  local lane=$1 cuts=$2 image=$root.$1.img console=$root.$1.console keys=$root.$1.keys
+  local acknowledged=-1 lost=0 done_cuts=0 slow=0 early after last process waited
+  RANDOM=$((${SEED:-1} + lane))
+  cp --sparse=always "$root.img" "$image"
+  mkfifo "$keys"
+  for ((cut = 1; cut <= cuts; ++cut)); do
+    : >"$console"
+    (machine "$image" -incoming "exec:cat $root.state") <>"$keys" >"$console" 2>&1 &
+    process=$!
+    wait_for 'POWER-READY' "$console" $process
+    echo "acknowledged $acknowledged" >"$keys"
+    # Every fifth cut comes while the guest mounts and checks.
+    early=$((cut % 5 == 0))
+    if [ $early -eq 1 ]; then
+      wait_for 'POWER-ON\|POWER-FAULT' "$console" $process
+      after=0
+    else
+      wait_for 'POWER-ACK\|POWER-FAULT' "$console" $process
+      after=$((RANDOM % 2))
     fi
-    tail -5 "$root.console"
-    lost=$((lost + 1))
-  fi
-  # A line that was cut off itself does not count as acknowledged.
-  last=$(tr -d '\r' <"$root.console" | grep -a '^POWER-ACK [0-9]*$' | tail -1 | cut -d' ' -f2 || true)
-  tail -c1 "$root.console" | grep -q . && last=$(tr -d '\r' <"$root.console" | grep -a '^POWER-ACK [0-9]*$' | tail -2 | head -1 | cut -d' ' -f2 || true)
-  [ -z "$last" ] || acknowledged=$last
-  done_cuts=$cut
-  [ $((cut % 10)) -ne 0 ] || echo "battery-power: $cut cuts, $((acknowledged + 1)) poses acknowledged, $lost faults"
+    sleep "$after.$(printf %03d $((RANDOM % 1000)))"
+    kill -9 $process 2>/dev/null || true
+    wait $process 2>/dev/null || true
+    if grep -a 'POWER-FAULT' "$console"; then
+      lost=$((lost + 1))
+    elif ! grep -aq 'POWER-ON' "$console" || { [ $early -eq 0 ] && ! grep -aq 'POWER-CHECKED' "$console"; }; then
+      if [ $waited -ge $((2 * patience)) ] && [ $slow -lt 10 ]; then # a busy machine; says nothing
+        slow=$((slow + 1))
+        cut=$((cut - 1))
+        continue
+      fi
+      tail -5 "$console"
+      lost=$((lost + 1))
+    fi
+    # A line that was cut off itself does not count as acknowledged.
+    last=$(tr -d '\r' <"$console" | sed '$d' | grep -a '^POWER-ACK [0-9]*$' | tail -1 | cut -d' ' -f2 || true)
+    [ -z "$last" ] || acknowledged=$last
+    done_cuts=$cut
+    [ $((cut % 10)) -ne 0 ] || echo "battery-power: machine $lane: $cut cuts, $((acknowledged + 1)) poses acknowledged, $lost faults"
+  done
+  echo "$done_cuts $((acknowledged + 1)) $lost" >"$root.$lane.result"
+}
+
+for ((number = 1; number <= lanes; ++number)); do
+  lane $number $((cuts / lanes + (number <= cuts % lanes))) &
 done
-echo "battery-power: $done_cuts power cuts, $((acknowledged + 1)) poses acknowledged, $lost faults"
-[ "$lost" -eq 0 ]
+wait
+read -r total poses faults < <(cat "$root".*.result | awk '{c += $1; p += $2; f += $3} END {print c, p, f}')
+echo "battery-power: $total power cuts, $poses poses acknowledged, $faults faults"
+[ "$faults" -eq 0 ] && [ "$total" -eq "$cuts" ]
