@@ -49,11 +49,12 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
 
 }  // namespace
 
-KnownNoise all_of(const PerAxis<PooledNoise>& noise) { return {&noise[0], &noise[1], &noise[2]}; }
+PerAxis<const PooledNoise*> all_of(const PerAxis<PooledNoise>& noise) {
+  return {&noise[0], &noise[1], &noise[2]};
+}
 
 Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
-                   const KnownNoise& known, const PerAxis<PooledNoise>* before,
-                   const Eigen::MatrixXd& beside) {
+                   const Before& before, const Eigen::MatrixXd& beside) {
   const auto predicted = predict_means_V(input.log, parameters);
   const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
   const Eigen::Index n = predicted[0].size();
@@ -63,6 +64,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
   stage.whitening.dwell_sd_V = dwell_scatter_V(input, parameters);
   parallel_for(kAxisCount, [&](std::size_t i) {
     Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
+    const bool freed = before.freed != nullptr && before.freed->coarse[i];
     RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
       // A converter without one of its bits does not round as it should.
@@ -71,10 +73,15 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
                               input.log.sample_sd_V[i], samples);
       mean_V = free.mean_V;
     };
-    free_means(predicted[i]);
+    if (freed) {
+      mean_V = before.freed->observed.mean_V[i];
+      free = {mean_V, before.freed->own_V2[i] - input.positioning_V2[i], true};
+    } else {
+      free_means(predicted[i]);
+    }
     const Eigen::VectorXd first_V2 = free.variance_V2;
-    if (known[i] != nullptr) {
-      stage.noise[i] = *known[i];
+    if (before.known[i] != nullptr) {
+      stage.noise[i] = *before.known[i];
     } else {
       Eigen::MatrixXd columns(n, jacobian.cols() + beside.cols());
       columns << jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n), beside;
@@ -85,22 +92,23 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
                                : input.noise[i],
                            input.positioning_V2[i] + free.variance_V2);
       stage.noise[i] = pool.pool(mean_V - predicted[i], design,
-                                 before != nullptr ? &(*before)[i].power : nullptr);
+                                 before.start != nullptr ? &(*before.start)[i].power : nullptr);
     }
-    if (free.coarse) {
+    if (free.coarse && !freed) {
       free_means(predicted[i] +
                  expected_from_others(stage.noise[i].covariance, mean_V - predicted[i]));
-      if (known[i] == nullptr) stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
+      if (before.known[i] == nullptr)
+        stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
     }
+    stage.coarse[i] = free.coarse;
     stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
     stage.whitening.set(i, stage.noise[i].covariance);
   });
   return stage;
 }
 
-Stage settle(const SearchInput& input, const EnlargedParameters& parameters,
-             const KnownNoise& known, const PerAxis<PooledNoise>* before) {
-  Stage stage = settle_noise(input, parameters, known, before);
+Stage settle(const SearchInput& input, const EnlargedParameters& parameters, const Before& before) {
+  Stage stage = settle_noise(input, parameters, before);
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
 }

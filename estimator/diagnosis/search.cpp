@@ -111,8 +111,9 @@ class Search {
  public:
   Search(const SearchInput& input, const CandidateList& list, const SearchOptions& options)
       : input_(input), list_(list), options_(options) {
-    const KnownNoise known = input.pooled != nullptr ? all_of(*input.pooled) : KnownNoise{};
-    stage_ = settle(input, input.start, known, nullptr);
+    Before before;
+    if (input.pooled != nullptr) before.known = all_of(*input.pooled);
+    stage_ = settle(input, input.start, before);
     noise_is_own_ = input.pooled == nullptr;
   }
 
@@ -193,10 +194,11 @@ class Search {
   }
   /// Takes over a model when its parameters are determined.
   bool adopt(const EnlargedParameters& parameters) {
-    KnownNoise known{};
+    Before before{{}, &stage_.noise, nullptr};
     for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
-      if (same_on_axis(parameters, stage_.fit.parameters, axis)) known[axis] = &stage_.noise[axis];
-    Stage next = settle(input_, parameters, known, &stage_.noise);
+      if (same_on_axis(parameters, stage_.fit.parameters, axis))
+        before.known[axis] = &stage_.noise[axis];
+    Stage next = settle(input_, parameters, before);
     if (!next.fit.determined) return false;
     stage_ = std::move(next);
     noise_is_own_ = true;
@@ -270,16 +272,12 @@ class Search {
     constexpr double kWorthALook = 1e-3;
     const Eigen::MatrixXd beside = slow_functions(input_.log);
     const EnlargedParameters& model = stage_.fit.parameters;
+    const Stage rich = settle_noise(input_, model, {{}, &stage_.noise, nullptr}, beside);
+    Before before{{}, &stage_.noise, &rich};
     // The noise that was handed in may have been estimated beside more than the model.
-    PerAxis<PooledNoise> plain = stage_.noise;
-    Stage rich;
-    parallel_for(2, [&](std::size_t which) {
-      if (which == 0) {
-        rich = settle_noise(input_, model, {}, &stage_.noise, beside);
-      } else if (!noise_is_own_) {
-        plain = settle_noise(input_, model, {}, &stage_.noise).noise;
-      }
-    });
+    for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
+      if (!rich.coarse[axis]) before.known[axis] = &stage_.noise[axis];
+    const PerAxis<PooledNoise> plain = settle_noise(input_, model, before).noise;
     PerAxis<bool> worth_a_look{};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const double gain = plain[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
@@ -288,11 +286,11 @@ class Search {
     }
     if (std::none_of(worth_a_look.begin(), worth_a_look.end(), [](bool b) { return b; }))
       return false;
-    rich.fit = fit_enlarged(input_.log, rich.observed, rich.whitening, model);
+    const EnlargedFit rich_fit = fit_enlarged(input_.log, rich.observed, rich.whitening, model);
     const CandidateResponses beside_slow =
-        candidate_responses(input_.log, list_, rich.whitening, rich.fit.parameters);
-    const CandidateGains gains(beside_slow, rich.fit);
-    std::vector<Scored> ranked = screen(list_, gains, gains.of(rich.fit.whitened_residual).col(0));
+        candidate_responses(input_.log, list_, rich.whitening, rich_fit.parameters);
+    const CandidateGains gains(beside_slow, rich_fit);
+    std::vector<Scored> ranked = screen(list_, gains, gains.of(rich_fit.whitened_residual).col(0));
     std::erase_if(ranked, [&](const Scored& s) {
       const Candidate& c = list_.candidates[s.candidate];
       return c.effect->subject() == Subject::head || !worth_a_look[c.axis] ||
@@ -302,9 +300,9 @@ class Search {
     std::vector<Stage> stages(std::min(kRefined, ranked.size()));
     parallel_for(stages.size(), [&](std::size_t k) {
       const Candidate& candidate = list_.candidates[ranked[k].candidate];
-      KnownNoise known = all_of(plain);
-      known[candidate.axis] = nullptr;
-      stages[k] = settle(input_, with_effect(model, candidate.active()), known, &rich.noise);
+      Before compared{all_of(plain), &rich.noise, &rich};
+      compared.known[candidate.axis] = nullptr;
+      stages[k] = settle(input_, with_effect(model, candidate.active()), compared);
     });
     const Scored* winner = nullptr;
     EnlargedParameters with_winner;

@@ -36,9 +36,18 @@ std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const A
   return stuck;
 }
 
+namespace {
+
+/// log of the number of ways to choose k out of n.
+double log_choices(double n, double k) {
+  return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
+}
+
+}  // namespace
+
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc) {
   constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
-  constexpr double kChance = 1e-9;
+  constexpr double kChance = 1e-6;
   if (codes.size() < 5) return {};
   // In declared steps from the lowest code. Rounding twice leaves half a step either way.
   const double range = static_cast<double>(codes.back() - codes.front());
@@ -50,14 +59,23 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
     double spread = 0;
   };
   const auto fit = [&](double step) {
-    double low = 0, high = 0;
-    for (const std::int64_t code : codes) {
-      const double off = std::remainder(static_cast<double>(code - codes.front()), step);
-      low = std::min(low, off);
-      high = std::max(high, off);
-      if (high - low > tolerance) return Fit{};
+    // Between its points a lattice leaves codes out.
+    if (static_cast<double>(codes.size()) > range / step + 2) return Fit{};
+    // The lowest code lies up to half a declared step off its point. Where the lattice leaves
+    // little room beside that, the remainders would wrap unless they are centred.
+    const int shifts = static_cast<int>(std::ceil(1 / (step - tolerance)));
+    for (int k = 0; k < shifts; ++k) {
+      const double shift = (k + 0.5) / shifts - 0.5;
+      double low = step, high = -step;
+      for (const std::int64_t code : codes) {
+        const double off = std::remainder(static_cast<double>(code - codes.front()) - shift, step);
+        low = std::min(low, off);
+        high = std::max(high, off);
+        if (high - low > tolerance) break;
+      }
+      if (high - low <= tolerance) return Fit{true, shift + 0.5 * (low + high), high - low};
     }
-    return Fit{true, 0.5 * (low + high), high - low};
+    return Fit{};
   };
   // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
   // enough to be told from chance.
@@ -71,18 +89,29 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
     }
   }
   if (first == 0) return {};
-  const double step = 0.5 * (first + last);
-  // Between its points a lattice leaves codes out.
-  if (static_cast<double>(codes.size()) > range / step + 2) return {};
-  const double looks = std::log(kCoarsest / kFinest) / resolution;
-  // So many of the codes of a step lie within the spread: of a step of two, both.
-  const double allowed = std::floor(fit(step).spread + 0.05) + 1;
-  const double log_chance = std::log(looks) - static_cast<double>(codes.size() - 2) *
-                                                  std::log(std::max(1.0, step / allowed));
+  double step = first;
+  Fit best = fit(first);
+  constexpr int kCloser = 64;
+  for (int k = 1; k <= kCloser; ++k) {
+    const double closer = first + (last - first) * k / kCloser;
+    const Fit trial = fit(closer);
+    if (!trial.good || trial.spread >= best.spread) continue;
+    step = closer;
+    best = trial;
+  }
+  // Of all sets of so many codes within the range, those that lie on one of the lattices. Every
+  // point is rounded to one code, which changes for some point whenever the origin moves a little;
+  // codes that are a whole step of the declared converter apart would be two for one point.
+  const double allowed = best.spread < 1 - 1e-9 ? 1 : 2;
+  const double seen = static_cast<double>(codes.size());
+  const double points = std::max(seen, std::floor(range / step) + 1);
+  const double lattices = std::log(kCoarsest / kFinest) / resolution * points;
+  const double log_chance =
+      std::log(lattices) + log_choices(allowed * points, seen) - log_choices(range + 1, seen);
   if (log_chance > std::log(kChance)) return {};
   const double lsb_V = adc.lsb_V();
   return Lattice{step * lsb_V,
-                 adc.min_V + lsb_V * (static_cast<double>(codes.front()) + fit(step).middle)};
+                 adc.min_V + lsb_V * (static_cast<double>(codes.front()) + best.middle)};
 }
 
 }  // namespace plumbline

@@ -33,7 +33,7 @@ struct Lattice {
 
 /// The lattice, coarser than that of the declared converter, whose points lie within half a
 /// declared step of every reading; empty when chance could put them there (more often than once in
-/// 10⁹) or nothing coarser shows.
+/// 10⁶) or nothing coarser shows.
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc);
 
 }  // namespace plumbline

@@ -60,6 +60,19 @@ TEST(CodeEvidence, AStepThatIsNoMultipleOfTheDeclaredOneIsMeasured) {
   EXPECT_LT(std::abs(std::remainder(-2.5 - lattice->origin_V, lattice->step_V)), 1e-4);
 }
 
+TEST(CodeEvidence, AStepThatIsHardlyCoarserIsMeasured) {
+  const Adc twelve_bits{12, -5.0, 0.0};
+  for (const double step_V : {1.67e-3, 5.63e-3}) {  // 1.37 and 4.6 declared steps
+    std::vector<double> u_V;
+    for (int k = 0; k < 3000; ++k)
+      u_V.push_back(rounded(-2.6 + std::round(2.2e-5 * k / step_V) * step_V, twelve_bits.lsb_V()));
+    const auto lattice = coarser_lattice(codes_seen(u_V, twelve_bits), twelve_bits);
+    ASSERT_TRUE(lattice) << step_V;
+    EXPECT_NEAR(lattice->step_V, step_V, 0.01 * step_V);
+    EXPECT_LT(std::abs(std::remainder(-2.6 - lattice->origin_V, lattice->step_V)), 4e-4);
+  }
+}
+
 TEST(CodeEvidence, FewCodesOfASoundConverterAreNoLattice) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u_V(-2.6, -2.53);
