@@ -41,8 +41,8 @@ td.long { white-space: normal; overflow-wrap: anywhere; }
 thead th { border-bottom: 1.5px solid #222; vertical-align: bottom; }
 th:first-child, td:first-child, td.words, th.words { text-align: left; }
 td.words, th.words { padding-left: 14px; }
-dl { display: grid; grid-template-columns: 200px 1fr; gap: 3px 14px; margin: 8px 0 14px; }
-dt { color: #444; }
+dl { display: grid; grid-template-columns: 200px minmax(0, 1fr); gap: 3px 14px; margin: 8px 0 14px; }
+dt { color: #444; overflow-wrap: anywhere; }
 dd { margin: 0; overflow-wrap: anywhere; }
 .missing { color: #a33; font-style: italic; }
 figure { margin: 16px 0 20px; break-inside: avoid; }
@@ -51,6 +51,12 @@ figcaption { font-size: 12.5px; color: #444; margin-top: 4px; }
 footer { border-top: 1px solid #999; margin-top: 28px; padding-top: 8px; font-size: 12.5px; }
 p.fingerprint { color: #555; overflow-wrap: anywhere; }
 .end { text-align: center; letter-spacing: .12em; margin-top: 10px; }
+@media screen and (max-width: 760px) {
+  body { margin: 12px auto; padding: 0 12px; }
+  table { display: block; overflow-x: auto; }
+  dl { grid-template-columns: minmax(0, 2fr) minmax(0, 3fr); }
+}
+h1, h2, p, caption, figcaption, .id, .verdict, .end { overflow-wrap: anywhere; }
 @media print { body { margin: 0; padding: 0; max-width: none; font-size: 10pt; } }
 )css";
 

@@ -114,7 +114,7 @@ std::string LiveFeed::poses() const {
 std::string LiveFeed::events() const {
   const std::lock_guard lock(mutex_);
   Json list = Json::array();
-  for (const auto& [key, event] : events_) list.push_back(event);
+  for (const LiveEvent& event : events_) list.push_back(event.json);
   return one_line({{"events", std::move(list)}});
 }
 
@@ -233,13 +233,26 @@ void LiveFeed::read_stored(storage::RunId run) {
   if (!events) return;
   const std::lock_guard lock(mutex_);
   for (const storage::EventRecord& event : *events) {
-    events_[fmt::format("{:016.3f} {} {}", event.t_s, event.kind, event.text)] = {
-        {"t_s", json_number(event.t_s)},
-        {"utc", event.utc},
-        {"kind", event.kind},
-        {"text", event.text}};
-    if (events_.size() > kMostEvents) events_.erase(events_.begin());
+    add_event(event.t_s, event.kind, event.text,
+              {{"t_s", json_number(event.t_s)},
+               {"utc", event.utc},
+               {"kind", event.kind},
+               {"text", event.text}});
   }
+}
+
+void LiveFeed::add_event(double t_s, const std::string& kind, const std::string& text, Json json) {
+  LiveEvent event{std::isfinite(t_s) ? std::llround(1e3 * t_s) : 0, kind + " " + text,
+                  std::move(json)};
+  // Of the same instant they stand in the order in which they were told.
+  const auto [first, last] =
+      std::equal_range(events_.begin(), events_.end(), event,
+                       [](const LiveEvent& a, const LiveEvent& b) { return a.t_ms < b.t_ms; });
+  const bool known =
+      std::any_of(first, last, [&](const LiveEvent& other) { return other.text == event.text; });
+  if (known) return;
+  events_.insert(last, std::move(event));
+  if (events_.size() > kMostEvents) events_.erase(events_.begin());
 }
 
 void LiveFeed::take_poses(ControlClient& client, std::size_t total) {
@@ -304,10 +317,8 @@ void LiveFeed::take(Json status) {
     for (const std::string& row : fresh_trace_) trace_.push_back(row);
     while (trace_.size() > kMostTrace) trace_.pop_front();
     for (const Json& event : status.at("events")) {
-      events_[fmt::format("{:016.3f} {} {}", number(event.at("t_s")),
-                          event.at("kind").get<std::string>(),
-                          event.at("text").get<std::string>())] = event;
-      if (events_.size() > kMostEvents) events_.erase(events_.begin());
+      add_event(number(event.at("t_s")), event.at("kind").get<std::string>(),
+                event.at("text").get<std::string>(), event);
     }
     running_ = true;
     status_ = status;

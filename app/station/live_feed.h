@@ -41,6 +41,13 @@ struct LiveMessage {
   std::string text;  ///< MESSAGE on one line
 };
 
+/// Stored and told events are the same one when time and text are.
+struct LiveEvent {
+  long long t_ms = 0;
+  std::string text;
+  Json json;
+};
+
 class LiveFeed {
  public:
   /// `history` must live longer.
@@ -73,6 +80,8 @@ class LiveFeed {
   void look_at_database();
   void read_plan(const std::string& config_toml);
   void read_stored(storage::RunId run);
+  /// Under the mutex.
+  void add_event(double t_s, const std::string& kind, const std::string& text, Json json);
   void refit();
   void publish(Json message);
 
@@ -84,7 +93,7 @@ class LiveFeed {
   // Under the mutex, because viewers ask for them.
   std::deque<std::string> trace_;  ///< rows, as text
   std::string poses_text_;
-  std::map<std::string, Json> events_;  ///< by time and text
+  std::vector<LiveEvent> events_;  ///< in the order in which they happened
   Json status_;
   bool running_ = false;
 

@@ -20,6 +20,7 @@ extern const char kStationLogin[];
 extern const char kStationLoginScript[];
 extern const char kStationStyle[];
 extern const char kStationApp[];
+extern const char kStationCommon[];
 extern const char kStationLive[];
 extern const char kStationHistory[];
 extern const char kStationChart[];
@@ -48,6 +49,7 @@ struct Asset {
 constexpr std::array kAssets = {
     Asset{"/station.css", "text/css; charset=utf-8", kStationStyle},
     Asset{"/app.js", "text/javascript; charset=utf-8", kStationApp},
+    Asset{"/common.js", "text/javascript; charset=utf-8", kStationCommon},
     Asset{"/live.js", "text/javascript; charset=utf-8", kStationLive},
     Asset{"/history.js", "text/javascript; charset=utf-8", kStationHistory},
     Asset{"/chart.js", "text/javascript; charset=utf-8", kStationChart},

@@ -1,28 +1,18 @@
 // Connection to the station and the choice of the view. Everything shown comes from the server, so
 // a reload loses nothing.
+import {ask, id} from "/common.js";
 import {showLive, startLive} from "/live.js";
 
 const kiosk = document.documentElement.dataset.view === "kiosk";
-const link = document.getElementById("link");
+const link = id("link");
 const views = ["live", "runs", "units"];
-
-export async function ask(path, options) {
-  const reply = await fetch(path, options);
-  if (reply.status === 401) location.reload();
-  if (!reply.ok) {
-    let why = `${reply.status}`;
-    try { why = (await reply.clone().json()).error ?? why; } catch { why = (await reply.text()).trim() || why; }
-    throw Object.assign(new Error(why), {status: reply.status});
-  }
-  return reply.json();
-}
 
 async function showView() {
   if (kiosk) return;  // has one view only
   const asked = location.hash.slice(1);
   const view = views.includes(asked) ? asked : "live";
   for (const name of views) {
-    document.getElementById(`view-${name}`).hidden = name !== view;
+    id(`view-${name}`).hidden = name !== view;
     const tab = document.querySelector(`[data-tab="${name}"]`);
     if (name === view) tab.setAttribute("aria-current", "page"); else tab.removeAttribute("aria-current");
   }

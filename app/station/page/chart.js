@@ -1,11 +1,11 @@
 // Canvas drawings in the colours of the page: traces, the map over δ × h, control charts.
 
 const style = () => getComputedStyle(document.documentElement);
-export const colour = (name) => style().getPropertyValue(`--${name}`).trim();
+const colour = (name) => style().getPropertyValue(`--${name}`).trim();
 const font = '12px system-ui, "Liberation Sans", sans-serif';
 
 // The canvas at the resolution of the screen; nothing while it is not visible.
-export function surface(canvas) {
+function surface(canvas) {
   const box = canvas.getBoundingClientRect();
   if (box.width < 2 || box.height < 2) return null;
   const ratio = window.devicePixelRatio || 1;
@@ -19,7 +19,7 @@ export function surface(canvas) {
 }
 
 // Round numbers that divide [low, high] into about `count` steps.
-export function ticks(low, high, count) {
+function ticks(low, high, count) {
   const raw = (high - low) / count;
   if (!(raw > 0) || !Number.isFinite(raw)) return [];
   const power = 10 ** Math.floor(Math.log10(raw));
@@ -29,7 +29,7 @@ export function ticks(low, high, count) {
   return list;
 }
 
-export function label(value, list) {
+function label(value, list) {
   const step = list.length > 1 ? Math.abs(list[1] - list[0]) : Math.abs(value) || 1;
   return value.toFixed(Math.min(12, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))).replace("-", "−");
 }
@@ -145,6 +145,12 @@ export function drawMap(canvas, plan, poses, axis, aim) {
   return known.length ? full : null;
 }
 
+function cut(c, text, room) {
+  let shown = text;
+  for (let length = text.length - 1; length > 0 && c.measureText(shown).width > room; --length) shown = `${text.slice(0, length)}…`;
+  return shown;
+}
+
 // Chart of individuals and moving ranges: values with ± U bars, mean and control limits.
 export function drawTrend(canvas, series) {
   const to = surface(canvas);
@@ -212,6 +218,8 @@ export function drawTrend(canvas, series) {
     c.fill();
   });
   c.fillStyle = colour("quiet"); c.textAlign = "center"; c.textBaseline = "top";
+  // As many serial numbers as there is room for, each cut to its room.
   const every = Math.ceil(points.length / Math.max(1, Math.floor((width - left) / 90)));
-  points.forEach((p, i) => { if (i % every === 0) c.fillText(p.serial.length > 12 ? `${p.serial.slice(0, 11)}…` : p.serial, xAt(i), height - box.bottom + 6); });
+  const room = every * (xAt(1) - xAt(0)) - 8;
+  points.forEach((p, i) => { if (i % every === 0) c.fillText(cut(c, p.serial, room), xAt(i), height - box.bottom + 6); });
 }

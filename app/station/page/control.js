@@ -1,8 +1,7 @@
 // Orders and the form that starts runs. Not part of the kiosk view.
-import {ask} from "/app.js";
+import {ask, id} from "/common.js";
 import {newest} from "/live.js";
 
-const id = (name) => document.getElementById(name);
 let station = null;
 
 async function look() {

@@ -1,16 +1,8 @@
 // Runs, their comparison, and parameters over units.
-import {ask} from "/app.js";
 import {drawTrend} from "/chart.js";
-import {decisionWords, uncertain} from "/live.js";
+import {ask, cell, decisionWords, element, id, milli, named, rounded, uncertain, whenLooksChange} from "/common.js";
 
-const id = (name) => document.getElementById(name);
-const element = (tag, content = "", attributes = {}) => {
-  const node = document.createElement(tag);
-  if (content instanceof Node) node.append(content); else node.textContent = content;
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
-  return node;
-};
-const mm = (values) => values.map((v) => v === null ? "–" : (v * 1000).toPrecision(2)).join("  ");
+const threeAxes = (values) => values.map((v) => milli(v, 2)).join("  ");
 
 let chosen = [];
 
@@ -42,11 +34,11 @@ function runRow(run) {
     id("compare").disabled = chosen.length !== 2;
   });
   const result = run.result;
-  row.append(element("td", box), element("td", String(run.id)), element("td", run.serial + (run.golden ? " (golden)" : "")),
-    element("td", run.started_utc.replace("T", " ").replace("Z", "")), element("td", run.state), element("td", String(run.poses)),
-    element("td", result ? tag(result.decision) : "–"),
-    element("td", result ? result.verdict.replace("_", " ") + (result.effects.length ? `: ${result.effects.join(", ")}` : "") : "–"),
-    element("td", result ? `${mm(result.before_mps2)} → ${mm(result.after_mps2)}` : "–"), element("td", files(run)));
+  row.append(cell("Compare", box), cell("Run", String(run.id)), cell("Unit", run.serial + (run.golden ? " (golden)" : "")),
+    cell("Started", run.started_utc.replace("T", " ").replace("Z", "")), cell("State", run.state), cell("Poses", String(run.poses)),
+    cell("Decision", result ? tag(result.decision) : "–"),
+    cell("Diagnosis", result ? result.verdict.replace("_", " ") + (result.effects.length ? `: ${result.effects.join(", ")}` : "") : "–"),
+    cell("Error / (mm/s²)", result ? `${threeAxes(result.before_mps2)} → ${threeAxes(result.after_mps2)}` : "–"), cell("Files", files(run)));
   return row;
 }
 
@@ -56,7 +48,7 @@ export async function showRuns() {
   try { found = await ask(`/api/runs?serial=${encodeURIComponent(serial)}`); } catch (error) { id("runs-note").textContent = error.message; return; }
   id("runs").tBodies[0].replaceChildren(...found.runs.map(runRow));
   id("runs-note").textContent = found.total === 0 ? (serial ? `No run of a unit like “${serial}”.` : "No run has been recorded yet.")
-    : `${found.runs.length} of ${found.total} runs. Error: RMS of held-out poses, axes x y z, before → after the added effects.`;
+    : `${found.total > found.runs.length ? `The newest ${found.runs.length} of ${found.total} runs` : found.total === 1 ? "1 run" : `${found.total} runs`}. Error: RMS of held-out poses, axes x y z, before → after the added effects.`;
 }
 
 let waiting = 0;
@@ -69,7 +61,7 @@ id("compare").addEventListener("click", async () => {
   card.hidden = false;
   try {
     const both = await ask(`/api/compare?a=${a}&b=${b}`);
-    const table = element("table");
+    const table = element("table", "", {class: "stack"});
     const head = element("tr");
     for (const name of ["Parameter", `Run ${a} (${both.a.serial})`, `Run ${b} (${both.b.serial})`, "Difference", "Eₙ"]) head.append(element("th", name, {scope: "col"}));
     table.append(element("thead", head));
@@ -77,9 +69,9 @@ id("compare").addEventListener("click", async () => {
     for (const row of both.parameters) {
       const line = element("tr");
       const far = row.E_n === null || Math.abs(row.E_n) > 1;
-      line.append(element("th", `${row.name} / (${row.unit})`, {scope: "row"}), element("td", uncertain(row.a, row.U_a)), element("td", uncertain(row.b, row.U_b)),
-        element("td", row.difference.toExponential(2).replaceAll("-", "−")),
-        element("td", element("span", `${row.E_n === null ? "∞" : row.E_n.toFixed(2).replace("-", "−")}${far ? "  differs" : ""}`, far ? {class: "tag bad"} : {})));
+      const E_n = `${row.E_n === null ? "∞" : rounded(row.E_n, 0.1)}${far ? "  differs" : ""}`;
+      line.append(element("th", named(row.name, row.unit), {scope: "row"}), cell(`Run ${a}`, uncertain(row.a, row.U_a)), cell(`Run ${b}`, uncertain(row.b, row.U_b)),
+        cell("Difference", rounded(row.difference, Math.hypot(row.U_a, row.U_b))), cell("Eₙ", element("span", E_n, far ? {class: "tag bad"} : {})));
       body.append(line);
     }
     table.append(body);
@@ -93,13 +85,18 @@ id("compare").addEventListener("click", async () => {
 });
 
 function trendCard(series) {
+  const {name, unit, points, chart, performance} = series;
+  const index = (value) => value === null ? "–" : value.toFixed(2);
+  let facts = "limits need two runs or more";
+  if (performance) {
+    const {mean, s, Pp, Ppk} = performance;
+    facts = `mean ${rounded(mean, s)}, s ${rounded(s, s)}`;
+    if (Ppk !== null) facts += `, Pp ${index(Pp)}, Ppk ${index(Ppk)}`;
+    if (chart?.outside.length) facts += `; ${chart.outside.length} beyond the limits`;
+  }
   const figure = element("figure", "", {class: "card trend"});
-  const performance = series.performance;
-  const index = (value) => value === null || value === undefined ? "–" : value.toFixed(2);
-  figure.append(element("figcaption", `${series.name} / (${series.unit})`), element("canvas", "", {role: "img", "aria-label": `${series.name} over ${series.points.length} runs`}),
-    element("p", performance ? `mean ${performance.mean.toPrecision(6).replace("-", "−")}, s ${performance.s.toPrecision(2)}`
-      + (performance.Ppk === null ? "" : `, Pp ${index(performance.Pp)}, Ppk ${index(performance.Ppk)}`)
-      + (series.chart?.outside.length ? `; ${series.chart.outside.length} beyond the limits` : "") : "limits need two runs or more", {class: "figures"}));
+  figure.append(element("figcaption", named(name, unit)), element("canvas", "", {role: "img", "aria-label": `${name} over ${points.length} runs: ${facts}`}),
+    element("p", facts, {class: "figures"}));
   return figure;
 }
 
@@ -107,8 +104,7 @@ let charts = [];
 function drawCharts() {
   for (const [canvas, series] of charts) drawTrend(canvas, series);
 }
-window.addEventListener("resize", drawCharts);
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawCharts);
+whenLooksChange(drawCharts);
 
 function fill(container, list, note) {
   if (list.length === 0) { container.replaceChildren(element("p", note, {class: "note"})); return; }

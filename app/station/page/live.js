@@ -1,7 +1,7 @@
 // The view of what goes on.
 import {drawMap, drawTrace} from "/chart.js";
+import {ask, cell, decisionWords, element, id, milli, uncertain, whenLooksChange} from "/common.js";
 
-const id = (name) => document.getElementById(name);
 const svg = (tag, attributes, text) => {
   const node = document.createElementNS("http://www.w3.org/2000/svg", tag);
   for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
@@ -24,10 +24,6 @@ const reasons = {
   failed: "Ended by a fault. The run can be resumed.",
   empty: "No run has been recorded yet.",
 };
-const decisions = {
-  pass: ["PASS", "good"], conditional_pass: ["CONDITIONAL PASS", "warn"],
-  conditional_fail: ["CONDITIONAL FAIL", "warn"], fail: ["FAIL", "bad"], none: ["NO LIMIT STATED", "none"],
-};
 const alarms = new Set(["fault", "bus", "loss", "retry", "suspect", "put off", "left out", "settle_cap"]);
 
 let live = null;
@@ -40,9 +36,7 @@ let dirty = true;
 // The last message; null before the first one.
 export const newest = () => live;
 
-export const decisionWords = (decision) => decisions[decision] ?? [decision, "none"];
-
-export function clock(seconds) {
+function clock(seconds) {
   if (seconds === null || seconds === undefined) return "–";
   const whole = Math.max(0, Math.round(seconds));
   const two = (n) => String(n).padStart(2, "0");
@@ -52,9 +46,8 @@ export function clock(seconds) {
 
 const text = (name, value) => { const node = id(name); if (node.textContent !== value) node.textContent = value; };
 
-async function get(path) {
-  try { const reply = await fetch(path); return reply.ok ? await reply.json() : null; } catch { return null; }
-}
+// Nothing where the station does not answer: the next message asks again.
+const get = (path) => ask(path).catch(() => null);
 
 // What came before this page was opened.
 export async function startLive() {
@@ -86,18 +79,10 @@ function showEvents(list) {
   if (key === lastEvents) return;
   lastEvents = key;
   id("events").replaceChildren(...newest.map((event) => {
-    const item = document.createElement("li");
     // Counts of what went wrong on the bus are none when they are all zero.
     const harmless = event.kind === "bus" && / received([,;] 0 [^,;]+)+$/.test(event.text);
-    if (alarms.has(event.kind) && !harmless) item.className = "alarm";
-    const time = document.createElement("time");
-    time.dateTime = event.utc;
-    time.textContent = event.utc.slice(11, 19);
-    const kind = document.createElement("span");
-    kind.textContent = event.kind;
-    const what = document.createElement("span");
-    what.textContent = event.text;
-    item.append(time, kind, what);
+    const item = element("li", "", alarms.has(event.kind) && !harmless ? {class: "alarm"} : {});
+    item.append(element("time", event.utc.slice(11, 19), {datetime: event.utc}), element("span", event.kind), element("span", event.text));
     return item;
   }));
 }
@@ -130,6 +115,8 @@ function board() {
   text("remaining", status ? clock(status.remaining_s) : "–");
   const temp = status?.newest?.temp_C;
   text("temperature", typeof temp === "number" ? `${temp.toFixed(2)} °C` : "–");
+  text("alarms", status ? alarmWords(status) : "");
+  id("alarms").parentElement.hidden = id("alarms").textContent === "";
   id("progress").value = status ? status.progress : phase === "finished" || phase === "calculating" ? 1 : 0;
   const box = id("verdict");
   box.hidden = !verdict;
@@ -141,38 +128,31 @@ function board() {
   document.title = verdict ? `${decisionWords(verdict.decision)[0]} – ${run.serial}` : `${words[state] ?? state} – plumbline`;
 }
 
-function outcome(verdict) {
-  const parts = [];
-  if (verdict.max_abs_error_mps2 !== null) {
-    const mm = (v) => (v * 1000).toPrecision(3);
-    parts.push(`largest error ${mm(verdict.max_abs_error_mps2)} mm/s² ± ${mm(2 * verdict.u_mps2)}, limit ${mm(verdict.limit_mps2)}`);
-  }
-  parts.push(verdict.verdict === "clean" ? "nothing left unexplained" : verdict.effects.length
-    ? `${verdict.verdict.replace("_", " ")}: ${verdict.effects.join(", ")}` : verdict.verdict.replace("_", " "));
-  return parts.join("; ");
+// What needed attention in this session, and the drive's own alarm.
+function alarmWords({head, attention}) {
+  const parts = head.alarm ? ["drive alarm"] : [];
+  for (const [kind, count] of Object.entries(attention)) if (count > 0) parts.push(`${kind.replace("_", " ")} ${count}`);
+  return parts.join(", ");
 }
 
-// Value ± U, both to the place of U's second digit.
-export function uncertain(value, U) {
-  if (!(U > 0) || !Number.isFinite(value)) return Number.isFinite(value) ? String(value) : "–";
-  const digits = Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(U))));
-  return `${value.toFixed(digits)} ± ${U.toFixed(digits)}`.replaceAll("-", "−");
+function outcome({verdict, effects, limit_mps2, max_abs_error_mps2, u_mps2}) {
+  const parts = [];
+  if (max_abs_error_mps2 !== null) {
+    parts.push(`largest error ${uncertain(1000 * max_abs_error_mps2, 2000 * u_mps2)} mm/s²` + (limit_mps2 > 0 ? `, limit ${milli(limit_mps2, 3)}` : ""));
+  }
+  const words = verdict.replace("_", " ");
+  parts.push(verdict === "clean" ? "nothing left unexplained" : effects.length ? `${words}: ${effects.join(", ")}` : words);
+  return parts.join("; ");
 }
 
 function estimate() {
   const {estimate, noise} = live;
-  const body = id("estimate").tBodies[0];
-  body.replaceChildren(...["x", "y", "z"].map((name, i) => {
-    const row = document.createElement("tr");
+  id("estimate").tBodies[0].replaceChildren(...["x", "y", "z"].map((name, i) => {
+    const row = element("tr");
     const fit = estimate?.[name];
-    const sd = noise?.sd_mps2?.[i];
-    for (const [k, cell] of [name, fit ? uncertain(fit.value[i], 2 * fit.u[i]) : "–", fit ? uncertain(fit.value[3], 2 * fit.u[3]) : "–",
-      fit ? (fit.rms_mps2 * 1000).toPrecision(3) : "–", typeof sd === "number" ? (sd * 1000).toPrecision(3) : "–"].entries()) {
-      const td = document.createElement(k ? "td" : "th");
-      if (!k) td.scope = "row";
-      td.textContent = cell;
-      row.append(td);
-    }
+    row.append(element("th", name, {scope: "row"}),
+      cell("Scale K / (V/g)", fit ? uncertain(fit.value[i], 2 * fit.u[i]) : "–"), cell("Bias U₀ / V", fit ? uncertain(fit.value[3], 2 * fit.u[3]) : "–"),
+      cell("Residual RMS / (mm/s²)", milli(fit?.rms_mps2, 3)), cell("Noise of a sample / (mm/s²)", milli(noise?.sd_mps2?.[i], 3)));
     return row;
   }));
 }
@@ -220,10 +200,7 @@ function showHead() {
 
 const choice = id("map-axis");
 ["x", "y", "z"].forEach((name, i) => {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.textContent = name;
-  button.setAttribute("aria-pressed", String(i === axis));
+  const button = element("button", name, {type: "button", "aria-pressed": String(i === axis), "aria-label": `axis ${name}`});
   button.addEventListener("click", () => {
     axis = i;
     [...choice.children].forEach((one, k) => one.setAttribute("aria-pressed", String(k === i)));
@@ -243,5 +220,4 @@ function draw() {
 }
 // At most ten times a second, however many messages come.
 setInterval(() => requestAnimationFrame(draw), 100);
-window.addEventListener("resize", () => { dirty = true; });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { dirty = true; });
+whenLooksChange(() => { dirty = true; });
