@@ -20,7 +20,8 @@ namespace {
 struct Started {
   storage::RunId run = 0;
   StartPoint start;
-  bool plan_is_done = false;  ///< only further poses are open
+  bool plan_is_done = false;     ///< only further poses are open
+  bool nothing_is_left = false;  ///< the run is finished, but nothing has come of it yet
 };
 
 /// The event with which further poses begin.
@@ -175,7 +176,9 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
   const bool plan_is_done = *further_begun || last->state == storage::RunState::finished;
   // Ended between the plan and the further poses, it is open to whoever asks for those.
   const bool may_go_further = request.further && !*further_begun;
-  if (last->state == storage::RunState::finished && !may_go_further) {
+  const bool finished = last->state == storage::RunState::finished && !may_go_further;
+  // It may have ended, by a power cut or a full disk, between the last pose and the results.
+  if (finished && (request.out.empty() || std::filesystem::exists(request.out / "result.json"))) {
     return refuse(
         fmt::format("run {}, the last one of {}, is finished; start a new one without "
                     "--resume",
@@ -193,6 +196,7 @@ Result<Started> find_unfinished(storage::RunStore& store, const SessionRequest& 
                     "one, or start a new run without --resume",
                     last->id));
   }
+  if (finished) return Started{.run = last->id, .start = {}, .nothing_is_left = true};
   auto start = start_after(store, last->id, plan, rig);
   if (!start) return fail(start.error());
   Started found{last->id, *std::move(start), plan_is_done};
@@ -225,7 +229,7 @@ Result<Started> begin(storage::RunStore& store, const SessionRequest& request, c
     if (!run) return fail(run.error());
     started.run = *run;
   }
-  if (!request.operator_name.empty()) {
+  if (!request.operator_name.empty() && !started.nothing_is_left) {
     const auto noted = store.add_event(
         started.run, {started.start.t_s, utc_now(), "operator", request.operator_name});
     if (!noted) return fail(noted.error());
@@ -359,6 +363,7 @@ Result<Session> run_session(const SessionRequest& request, const EngineControl& 
   if (!begun) return fail(begun.error());
 
   Session session{begun->run, {}};
+  if (begun->nothing_is_left) return session;
   if (!begun->plan_is_done) {
     Engine engine(*connections->head, *connections->acquisition, *store, control,
                   engine_options(rig), observer);

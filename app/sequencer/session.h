@@ -17,7 +17,9 @@ namespace plumbline::app {
 struct SessionRequest {
   const RigDescription& rig;
   std::filesystem::path database;
-  std::filesystem::path out = {};  ///< shares the disk; only looked at
+  /// Where the results will be; only looked at. A finished run is resumed, which measures nothing,
+  /// as long as there are none.
+  std::filesystem::path out = {};
   bool resume = false;             ///< go on with the last unfinished run of rig.run.dut.serial
   std::string operator_name = {};  ///< who measures; noted as an event unless empty
   std::optional<Plan> plan = {};   ///< instead of the one that `rig` describes

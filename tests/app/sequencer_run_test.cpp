@@ -107,6 +107,16 @@ TEST_F(SequencerRun, StopsOnRequestAndResumes) {
   ASSERT_FALSE(again.has_value());
   EXPECT_EQ(again.error().code, ErrorCode::input);
   EXPECT_THAT(again.error().message, HasSubstr("is finished"));
+
+  // One whose power was cut before there was a result is gone on with; nothing is left to measure.
+  SessionRequest late{.rig = rig_, .database = database(), .out = folder_, .resume = true};
+  const auto to_calibrate = run_session(late, go_on, {});
+  ASSERT_TRUE(to_calibrate.has_value()) << to_calibrate.error().message;
+  EXPECT_TRUE(to_calibrate->outcome.has_value());
+  EXPECT_EQ(to_calibrate->run, stopped->run);
+  EXPECT_EQ(stored().events.size(), whole.events.size());
+  std::ofstream(folder_ / "result.json") << "{}";
+  EXPECT_THAT(run_session(late, go_on, {}).error().message, HasSubstr("is finished"));
 }
 
 TEST_F(SequencerRun, GoesOnWithFurtherPosesInTheSameRun) {

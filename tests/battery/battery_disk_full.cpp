@@ -36,6 +36,7 @@ void check(const Bench& bench, const TempFolder& folder, const fs::path& databas
   if (lines < 1 || last == std::string::npos) complaints.add(when, "no clear line: " + full.err);
   const Audit before = audit(database);
   complaints.add(when, before.faults);
+  fs::remove_all(folder / "out");
   Program again(bench, database, folder, before.any_run);
   const Ended ended = again.wait();
   if (ended.code != 0 && ended.code != 1) {
