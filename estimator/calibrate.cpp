@@ -152,7 +152,9 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
 
 bool rounded_coarser_than_declared(const CalibrationInput& input, std::size_t axis) {
   const auto& adc = input.description.adc;
-  return adc && coarser_lattice(codes_seen(input.run.samples.u_V[axis], *adc), *adc).has_value();
+  return adc && coarser_lattice(codes_seen(input.run.samples.u_V[axis], *adc), *adc,
+                                dwells_over_codes(input.run, axis, *adc))
+                    .has_value();
 }
 
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {

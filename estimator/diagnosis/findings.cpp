@@ -33,6 +33,8 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
       parameter.estimated = true;
       parameter.u = std::sqrt(std::max(estimate.covariance(row, row), 0.0));
       ++row;
+    } else {
+      parameter.u = active.effect->choice_uncertainty(log, active.axis, k);
     }
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
     if (infos[k].role == ParameterRole::index && infos[k].unit == "s") {

@@ -163,6 +163,34 @@ class Search {
       if (infos[k].role == ParameterRole::shape) newcomer.free[k] = false;
     return fit(held);
   }
+  /// The model with one more effect where the linear problem puts both. What follows the readings
+  /// finely may not be reached from parameters that were estimated without it. Precondition:
+  /// responses() is up to date.
+  EnlargedParameters linear_start(std::size_t candidate) const {
+    const auto& [g, first, count] = responses_->place[candidate];
+    const CandidateResponses::Group& group = responses_->groups[g];
+    const Eigen::MatrixXd& model = stage_.fit.whitened_jacobian;
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(model.rows(), model.cols() + count);
+    columns.leftCols(model.cols()) = model;
+    columns.block(group.first_row, model.cols(), group.means.rows(), count) =
+        group.means.middleCols(first, count);
+    columns.block(group.first_dwell_row, model.cols(), group.dwells.rows(), count) =
+        group.dwells.middleCols(first, count);
+    const Eigen::VectorXd norms = columns.colwise().norm().cwiseMax(1e-300);
+    const Eigen::VectorXd step =
+        norms.cwiseInverse().cwiseProduct((columns * norms.cwiseInverse().asDiagonal())
+                                              .colPivHouseholderQr()
+                                              .solve(stage_.fit.whitened_residual));
+    EnlargedParameters start = stage_.fit.parameters;
+    start.set_free_values(start.free_values() + step.head(model.cols()));
+    ActiveEffect active = list_.candidates[candidate].active();
+    const auto infos = active.effect->parameters();
+    Eigen::Index column = model.cols();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0)
+        active.p[k] *= step(column++);
+    return with_effect(std::move(start), active);
+  }
   /// What the codes prove joins the model. Its response may hang on the level of the axis more
   /// finely than the level is known without it, so the level is searched for.
   void adopt_proven(std::size_t candidate) {
@@ -216,8 +244,8 @@ class Search {
   /// Adds the best candidate if the search as a whole would not often find as much in noise.
   bool add_one() {
     const CandidateGains gains(responses(), stage_.fit);
-    std::vector<Scored> ranked =
-        screen(list_, gains, gains.of(stage_.fit.whitened_residual).col(0));
+    const Eigen::VectorXd first_order = gains.of(stage_.fit.whitened_residual).col(0);
+    std::vector<Scored> ranked = screen(list_, gains, first_order);
     std::erase_if(ranked, [&](const Scored& s) {
       const Candidate& c = list_.candidates[s.candidate];
       return std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c);
@@ -237,7 +265,13 @@ class Search {
     constexpr std::size_t kRefined = 10;
     std::vector<EnlargedFit> fits(std::min(kRefined, ranked.size()));
     parallel_for(fits.size(), [&](std::size_t k) {
-      fits[k] = fit_with(stage_.fit.parameters, list_.candidates[ranked[k].candidate].active());
+      const std::size_t candidate = ranked[k].candidate;
+      fits[k] = fit_with(stage_.fit.parameters, list_.candidates[candidate].active());
+      const double promised = first_order(static_cast<Eigen::Index>(candidate));
+      if (fits[k].determined && stage_.fit.chi2 - fits[k].chi2 > 0.5 * promised) return;
+      EnlargedFit other = fit(linear_start(candidate));
+      if (other.determined && (!fits[k].determined || other.chi2 < fits[k].chi2))
+        fits[k] = std::move(other);
     });
     const Scored* winner = nullptr;
     EnlargedParameters with_winner;

@@ -12,9 +12,12 @@ class Quantization final : public Effect {
   std::string id() const override { return "adc.quantization"; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"lsb", "V", ParameterRole::shape},
+    return {{"lsb", "V", ParameterRole::index},
             {"origin", "V", ParameterRole::index},
             {"noise", "V", ParameterRole::shape}};
+  }
+  double choice_uncertainty(const VisitLog& log, std::size_t axis, std::size_t k) const override {
+    return k == 0 && log.coarser_lattice[axis] ? log.coarser_lattice[axis]->u_step_V : 0;
   }
   // Against a declared step the codes prove a coarser one; without it they only suggest one.
   bool certain(const VisitLog& log) const override { return log.adc.has_value(); }
@@ -31,14 +34,28 @@ class Quantization final : public Effect {
   double term_g(const TermInput& input, const double* p) const override {
     const double lsb_V = p[0];
     const double sd = std::min(p[2] / lsb_V, effect::kMostNoise);
-    const double value = (input.output_V - p[1]) / lsb_V;  // in steps, as all of this
-    const double nearest = std::round(value);
-    double rounded = nearest;
-    for (double edge = 0.5; edge < 1 + effect::kReach * sd; ++edge) {
-      rounded += 1 - effect::share_below(nearest + edge, value, sd);
-      rounded -= effect::share_below(nearest - edge, value, sd);
+    const double value = (input.output_V - p[1]) / lsb_V;  // in steps, from the origin
+    const double reach = 0.5 + effect::kReach * sd;
+    double rounded_V = 0, below = 0;
+    for (double point = std::round(value - reach); point < value + reach + 1; ++point) {
+      const double upper = effect::share_below(point + 0.5, value, sd);
+      rounded_V += (upper - below) * reading_V(input, p, point);
+      below = upper;
     }
-    return (rounded - value) * lsb_V / input.K_V_per_g;
+    return (rounded_V - input.output_V) / input.K_V_per_g;
+  }
+
+ private:
+  /// What the declared converter makes of a point of the coarser lattice.
+  static double reading_V(const TermInput& input, const double* p, double point) {
+    const double at_V = p[1] + p[0] * point;
+    const auto& lattice = input.log.coarser_lattice[input.axis];
+    if (lattice && point >= 0 && point < static_cast<double>(lattice->second_rounding_V.size())) {
+      const double second_V = lattice->second_rounding_V[static_cast<std::size_t>(point)];
+      if (!std::isnan(second_V)) return at_V + second_V;
+    }
+    const auto& adc = input.log.adc;
+    return adc ? adc->min_V + adc->lsb_V() * std::round((at_V - adc->min_V) / adc->lsb_V()) : at_V;
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace plumbline {
 
@@ -45,7 +46,23 @@ double log_choices(double n, double k) {
 
 }  // namespace
 
-std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc) {
+std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc) {
+  constexpr std::size_t kReadingsPerCode = 4;  // at least, so that none is missing by chance
+  std::size_t dwells = 0;
+  for (const Pose& pose : set.poses) {
+    const auto first = set.samples.u_V[axis].begin() + static_cast<std::ptrdiff_t>(pose.first);
+    const std::vector<std::int64_t> codes =
+        codes_seen({first, first + static_cast<std::ptrdiff_t>(pose.count)}, adc);
+    if (pose.count < kReadingsPerCode * codes.size()) continue;
+    const bool over = std::adjacent_find(codes.begin(), codes.end(),
+                                         [](auto a, auto b) { return b - a > 1; }) != codes.end();
+    dwells += over ? 1 : 0;
+  }
+  return dwells;
+}
+
+std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
+                                       std::size_t dwells_over_codes) {
   constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
   constexpr double kChance = 1e-6;
   if (codes.size() < 5) return {};
@@ -80,7 +97,7 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
   // enough to be told from chance.
   double first = 0, last = 0;
-  for (double step = std::min(kCoarsest, range / 4); step > kFinest; step *= 1 - resolution) {
+  for (double step = std::min(kCoarsest, (range + 1) / 4); step > kFinest; step *= 1 - resolution) {
     if (fit(step).good) {
       if (first == 0) first = step;
       last = step;
@@ -89,29 +106,38 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
     }
   }
   if (first == 0) return {};
-  double step = first;
-  Fit best = fit(first);
+  double least_spread = tolerance;
   constexpr int kCloser = 64;
-  for (int k = 1; k <= kCloser; ++k) {
-    const double closer = first + (last - first) * k / kCloser;
-    const Fit trial = fit(closer);
-    if (!trial.good || trial.spread >= best.spread) continue;
-    step = closer;
-    best = trial;
+  for (int k = 0; k <= kCloser; ++k) {
+    const Fit closer = fit(first + (last - first) * k / kCloser);
+    if (closer.good) least_spread = std::min(least_spread, closer.spread);
   }
   // Of all sets of so many codes within the range, those that lie on one of the lattices. Every
   // point is rounded to one code, which changes for some point whenever the origin moves a little;
   // codes that are a whole step of the declared converter apart would be two for one point.
-  const double allowed = best.spread < 1 - 1e-9 ? 1 : 2;
+  const double allowed = least_spread < 1 - 1e-9 ? 1 : 2;
+  const double step = 0.5 * (first + last);
   const double seen = static_cast<double>(codes.size());
   const double points = std::max(seen, std::floor(range / step) + 1);
   const double lattices = std::log(kCoarsest / kFinest) / resolution * points;
-  const double log_chance =
-      std::log(lattices) + log_choices(allowed * points, seen) - log_choices(range + 1, seen);
+  const double log_chance = std::log(lattices) + log_choices(allowed * points, seen) -
+                            log_choices(range + 1, seen) +
+                            static_cast<double>(dwells_over_codes) * std::log(0.5);
   if (log_chance > std::log(kChance)) return {};
   const double lsb_V = adc.lsb_V();
-  return Lattice{step * lsb_V,
-                 adc.min_V + lsb_V * (static_cast<double>(codes.front()) + best.middle)};
+  Lattice lattice{step * lsb_V,
+                  adc.min_V + lsb_V * (static_cast<double>(codes.front()) + fit(step).middle),
+                  (first - last + resolution * step) * lsb_V / std::sqrt(12.0),
+                  {}};
+  lattice.second_rounding_V.assign(static_cast<std::size_t>(std::lround(range / step)) + 2,
+                                   std::numeric_limits<double>::quiet_NaN());
+  for (const std::int64_t code : codes) {
+    const double reading_V = adc.min_V + lsb_V * static_cast<double>(code);
+    const auto k = std::lround((reading_V - lattice.origin_V) / lattice.step_V);
+    lattice.second_rounding_V.at(static_cast<std::size_t>(k)) =
+        reading_V - lattice.origin_V - lattice.step_V * static_cast<double>(k);
+  }
+  return lattice;
 }
 
 }  // namespace plumbline

@@ -29,11 +29,19 @@ std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const A
 struct Lattice {
   double step_V = 0;
   double origin_V = 0;
+  double u_step_V = 0;  ///< standard uncertainty: neighbouring steps have points there, too
+  /// What the declared converter adds to each point from k = 0 on; NaN where it was not seen.
+  std::vector<double> second_rounding_V = {};
 };
+
+/// In how many dwells of `set` the readings of an axis step over a code of `adc`: most readings
+/// share few codes, and none lies between two of them. Noise of a sound converter does not do that.
+std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc);
 
 /// The lattice, coarser than that of the declared converter, whose points lie within half a
 /// declared step of every reading; empty when chance could put them there (more often than once in
-/// 10⁶) or nothing coarser shows.
-std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc);
+/// 10⁶) or nothing coarser shows. Every one of `dwells_over_codes` counts as even odds besides.
+std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
+                                       std::size_t dwells_over_codes = 0);
 
 }  // namespace plumbline

@@ -77,6 +77,8 @@ class Effect {
                                double since_arrival_s) const;
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&) const { return false; }
+  /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.
+  virtual double choice_uncertainty(const VisitLog&, std::size_t, std::size_t) const { return 0; }
   /// Whether it may stand in a model more than once for one axis: at another pose, say.
   virtual bool repeats() const { return false; }
   /// The same response by parameters as one would state them: positive amplitudes, angles within

@@ -169,7 +169,8 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     if (log.adc) {
       const std::vector<std::int64_t> codes = codes_seen(samples.u_V[i], *log.adc);
       log.stuck_bits[i] = stuck_bits(codes, *log.adc);
-      log.coarser_lattice[i] = coarser_lattice(codes, *log.adc);
+      log.coarser_lattice[i] =
+          coarser_lattice(codes, *log.adc, dwells_over_codes(set, i, *log.adc));
       log.input_sd_V[i] = input_scatter_V(set, log, i);
     }
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);

@@ -73,6 +73,34 @@ TEST(CodeEvidence, AStepThatIsHardlyCoarserIsMeasured) {
   }
 }
 
+TEST(CodeEvidence, DwellsThatStepOverCodesProveALatticeOfFewPoints) {
+  const Adc twelve_bits{12, -5.0, 0.0};
+  const double step_V = 9.04e-3;  // 7.4 declared steps: five points in the range
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> noise_V(0, 2.5e-4);
+  const auto set_of = [&](double rounded_to_V) {
+    MeasurementSet set;
+    for (int k = 0; k < 300; ++k) {
+      set.poses.push_back({k, 0, 0, set.samples.u_V[0].size(), 40});
+      for (int m = 0; m < 40; ++m) {
+        const double u_V = -2.5 + 1.2e-4 * k + noise_V(random);
+        set.samples.u_V[0].push_back(rounded(
+            -2.5 + std::round((u_V + 2.5) / rounded_to_V) * rounded_to_V, twelve_bits.lsb_V()));
+      }
+    }
+    return set;
+  };
+  const MeasurementSet coarse = set_of(step_V), sound = set_of(1e-9);
+  const auto codes = codes_seen(coarse.samples.u_V[0], twelve_bits);
+  ASSERT_LE(codes.size(), 6U);
+  EXPECT_FALSE(coarser_lattice(codes, twelve_bits));
+  const auto lattice =
+      coarser_lattice(codes, twelve_bits, dwells_over_codes(coarse, 0, twelve_bits));
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(lattice->step_V, step_V, 0.03 * step_V);
+  EXPECT_EQ(dwells_over_codes(sound, 0, twelve_bits), 0U);
+}
+
 TEST(CodeEvidence, FewCodesOfASoundConverterAreNoLattice) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u_V(-2.6, -2.53);
