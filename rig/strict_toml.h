@@ -2,7 +2,6 @@
 // name, with the nearest known key suggested. Used for run.toml, rig.toml and world.toml alike.
 #pragma once
 
-#include <toml++/toml.h>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "estimator/measurement.h"
+#include "rig/toml.h"
 
 namespace plumbline::rig {
 

@@ -2,13 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <toml++/toml.h>
 #include <algorithm>
 #include <set>
 #include <sstream>
 
 #include "app/io/read_file.h"
 #include "rig/strict_toml.h"
+#include "rig/toml.h"
 
 namespace plumbline::app {
 

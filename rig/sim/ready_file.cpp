@@ -1,11 +1,13 @@
 #include "rig/sim/ready_file.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
+
 #include <unistd.h>
 
 #include <fstream>
 #include <system_error>
+
+#include "rig/toml.h"
 
 namespace plumbline::sim {
 

@@ -59,6 +59,10 @@ TEST(StrictToml, SyntaxErrorHasAPlace) {
   EXPECT_TRUE(message_of("a = \n", [](StrictTable&) {}).starts_with("f.toml:1:"));
 }
 
+TEST(StrictToml, AControlCharacterForAKeyIsRefusedNotAsserted) {
+  EXPECT_TRUE(message_of("[\x1c]\n", [](StrictTable&) {}).starts_with("f.toml:1:2: "));
+}
+
 TEST(StrictToml, NearestSuggestsNothingFar) {
   EXPECT_EQ(nearest("order", {"ordr", "speed"}), "ordr");
   EXPECT_EQ(nearest("zzzzzz", {"order", "speed"}), "");
