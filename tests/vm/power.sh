@@ -105,7 +105,7 @@ fi
 # lane NUMBER CUTS: a disk of its own, cut so many times. Its last line: cuts, poses, faults.
 lane() {
   local lane=$1 cuts=$2 image=$root.$1.img console=$root.$1.console keys=$root.$1.keys
-  local acknowledged=-1 lost=0 done_cuts=0 slow=0 early after last process waited
+  local acknowledged=-1 lost=0 done_cuts=0 slow=0 early after last process told waited
   RANDOM=$((${SEED:-1} + lane))
   cp --sparse=always "$root.img" "$image"
   mkfifo "$keys"
@@ -114,7 +114,12 @@ lane() {
     (machine "$image" -incoming "exec:cat $root.state") <>"$keys" >"$console" 2>&1 &
     process=$!
     wait_for 'POWER-READY' "$console" $process
-    echo "acknowledged $acknowledged" >"$keys"
+    # Said again: a line that came while the shell was about to stop listening is lost.
+    while kill -0 $process 2>/dev/null && ! grep -aq 'POWER-ON' "$console"; do
+      echo "acknowledged $acknowledged"
+      sleep 3
+    done >"$keys" &
+    told=$!
     # Every fifth cut comes while the guest mounts and checks.
     early=$((cut % 5 == 0))
     if [ $early -eq 1 ]; then
@@ -125,8 +130,8 @@ lane() {
       after=$((RANDOM % 2))
     fi
     sleep "$after.$(printf %03d $((RANDOM % 1000)))"
-    kill -9 $process 2>/dev/null || true
-    wait $process 2>/dev/null || true
+    kill -9 $process $told 2>/dev/null || true
+    wait $process $told 2>/dev/null || true
     if grep -a 'POWER-FAULT' "$console"; then
       lost=$((lost + 1))
     elif ! grep -aq 'POWER-ON' "$console" || { [ $early -eq 0 ] && ! grep -aq 'POWER-CHECKED' "$console"; }; then
