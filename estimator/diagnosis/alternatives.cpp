@@ -46,7 +46,8 @@ EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
                        const EnlargedParameters& base, const std::vector<Candidate>& added) {
   EnlargedParameters model = base;
   for (const Candidate& candidate : added) model.effects.push_back(candidate.active());
-  return fit_enlarged(input.log, result.observed, result.whitening, model);
+  return fit_holding_shapes(input.log, result.observed, result.whitening, model,
+                            base.effects.size());
 }
 
 }  // namespace

@@ -91,10 +91,8 @@ void set_sensor_response(const Baseline& base, const ActiveEffect& active,
   for (Eigen::Index k = 0; k < change.size(); ++k) {
     const auto visit = static_cast<std::size_t>(k);
     const double response_V = twelve.head<3>().dot(base.a_g[visit]);
-    // The level may be off by as much as the effect that the model lacks; the readings are not.
-    const double output_V = base.log.visits[visit].mean_V[active.axis];
-    const TermInput input{base.log,          visit,    active.axis, base.a_g,
-                          response_V / K_ii, output_V, K_ii};
+    const TermInput input{
+        base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
     change(k) = K_ii * active.effect->term_g(input, active.p.data());
   }
 }

@@ -376,4 +376,19 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   return fit;
 }
 
+EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
+                               const PoseWhitening& whitening, const EnlargedParameters& start,
+                               std::size_t first_new) {
+  EnlargedFit fit = fit_enlarged(log, observed, whitening, start);
+  if (fit.determined) return fit;
+  EnlargedParameters held = fit.parameters;
+  for (std::size_t e = first_new; e < held.effects.size(); ++e) {
+    ActiveEffect& newcomer = held.effects[e];
+    const auto infos = newcomer.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (infos[k].role == ParameterRole::shape) newcomer.free[k] = false;
+  }
+  return fit_enlarged(log, observed, whitening, held);
+}
+
 }  // namespace plumbline

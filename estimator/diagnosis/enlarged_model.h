@@ -106,4 +106,10 @@ struct EnlargedFit : EnlargedEstimate {
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start);
 
+/// The same; where that leaves something undetermined, the shapes of the effects from `first_new`
+/// on stay where they ended up: a boundary between two readings, say, that the visits do not place.
+EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
+                               const PoseWhitening& whitening, const EnlargedParameters& start,
+                               std::size_t first_new);
+
 }  // namespace plumbline

@@ -151,17 +151,9 @@ class Search {
   EnlargedFit fit(const EnlargedParameters& parameters) const {
     return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
   }
-  /// The model with one more effect. A shape that the visits do not determine from where it ended
-  /// up (a boundary between two readings) stays there.
   EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const {
-    EnlargedFit with = fit(with_effect(model, active));
-    if (with.determined) return with;
-    EnlargedParameters held = with.parameters;
-    ActiveEffect& newcomer = held.effects.back();
-    const auto infos = newcomer.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (infos[k].role == ParameterRole::shape) newcomer.free[k] = false;
-    return fit(held);
+    return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening,
+                              with_effect(model, active), model.effects.size());
   }
   /// The model with one more effect where the linear problem puts both. What follows the readings
   /// finely may not be reached from parameters that were estimated without it. Precondition:
