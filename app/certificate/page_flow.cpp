@@ -98,7 +98,7 @@ class Flow {
 
   /// One line of a layout with its top at `y`; lines keep the alignment inside the layout's width.
   void draw_line(const SharedLayout& layout, int index, double x, double y, double size,
-                 std::string color) {
+                 const std::string& color) {
     draw([=](cairo_t* cairo) {
       PangoLayoutLine* line = pango_layout_get_line_readonly(layout.get(), index);
       PangoRectangle logical;

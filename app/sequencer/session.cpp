@@ -315,7 +315,7 @@ Result<void> run_further(const SessionRequest& request, const Plan& plan, storag
   for (long long step = 0; step < first; ++step) start->committed.push_back(step);
   if (auto reopened = store.finish_run(run, storage::RunState::running, ""); !reopened)
     return reopened;
-  const auto noted =
+  auto noted =
       store.add_event(run, {start->t_s, utc_now(), kFurther,
                             fmt::format("{} further {} to tell effects apart", steps.size(),
                                         steps.size() == 1 ? "pose" : "poses")});

@@ -126,6 +126,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
     const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
     if (sum.size() < 2 || without.chi2 - fit.chi2 < needed(free)) continue;
     std::vector<std::string> ids;
+    ids.reserve(sum.size());
     for (const Candidate& member : sum) ids.push_back(member.effect->id());
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
