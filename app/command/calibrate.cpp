@@ -102,7 +102,9 @@ void add_calibrate(CLI::App& program, Invocation& invocation) {
           ->needs(samples)
           ->needs(config)
           ->excludes(static_record)
-          ->excludes(effects);
+          ->excludes(effects)
+          ->excludes(sub->get_option("--lab"))
+          ->excludes(sub->get_option("--language"));
   sub->add_option("--columns", options->scalar_files.columns,
                   "With --scalar: which column is which axis, as in x=ax_raw,y=ay_raw,z=az_raw "
                   "(default x=ux_V,y=uy_V,z=uz_V)")

@@ -114,6 +114,12 @@ TEST(ScalarProgram, BadInputIsOneLineAndCode2) {
   EXPECT_THAT(outcome.err, HasSubstr("s.csv:7:3 (ux_V): 'nan' is not finite"));
   EXPECT_EQ(run_plumbline(arguments(folder, {"--skip-bad-rows"})).exit_code, 0);
 
+  // Not used without angles, and not ignored without a word.
+  outcome = run_plumbline(arguments(folder, {"--language", "uk"}));
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--language"));
+  EXPECT_EQ(outcome.error_lines(), 1);
+
   outcome = run_plumbline(arguments(folder, {"--columns", "x=ux_V,y=uy_V"}));
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("needs all three axes"));
