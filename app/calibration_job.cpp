@@ -184,7 +184,7 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   }
   if (summary.state != storage::RunState::finished) {
     job.events.push_back({.t_s = 0,
-                          .kind = "incomplete",
+                          .kind = kIncomplete,
                           .text = fmt::format("the run is not finished: {} after {} poses",
                                               storage::to_string(summary.state), summary.poses)});
   }
@@ -202,6 +202,7 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
   CalibrationOutcome outcome;
   outcome.calibration = calibrate_job(job);
   const Calibration& calibration = outcome.calibration;
+  outcome.calibration.decision = stated_decision(calibration.decision, job.events);
   if (auto good = check_observable(calibration.observability, job.source, job.run.poses.size());
       !good) {
     return fail(good.error());

@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "app/certificate/certificate.h"
-#include "app/certificate/dcc/signature.h"
+#include "app/certificate/style.h"
 #include "app/config/own_effects.h"
 #include "app/exit_code.h"
 #include "app/provenance.h"
@@ -17,13 +16,6 @@
 #include "storage/run_store.h"
 
 namespace plumbline::app {
-
-/// What a certificate says and how, beside what was measured.
-struct CertificateStyle {
-  Laboratory laboratory;
-  Language language = Language::en;
-  std::optional<SigningKey> signing;
-};
 
 /// Everything that a calibration needs, wherever it was read.
 struct CalibrationJob {

@@ -4,7 +4,7 @@
 
 #include "app/axis_columns.h"
 #include "app/certificate/certificate_files.h"
-#include "app/certificate/scalar_certificate.h"
+#include "app/certificate/scalar_results.h"
 #include "app/config/run_description.h"
 #include "app/io/csv.h"
 #include "app/io/csv_table.h"
@@ -95,6 +95,7 @@ std::string rest_detector_words() {
 }
 
 Result<ScalarOutcome> calibrate_scalar_files(const ScalarFiles& files,
+                                             const CertificateStyle& style,
                                              const std::filesystem::path& out, std::uint64_t seed) {
   const auto columns = columns_of(files.columns);
   if (!columns) return fail(columns.error());
@@ -119,12 +120,17 @@ Result<ScalarOutcome> calibrate_scalar_files(const ScalarFiles& files,
   }
   const ScalarSource source{rests->how, unit_of_column((*columns)[0]), *columns};
   const Json json = scalar_json(*calibration, source, provenance);
-  if (auto done = folder->write("result.json", file_text(json)); !done) return fail(done.error());
-  const Document document =
-      make_scalar_certificate({*description, *calibration, source, provenance});
-  if (auto done = write_pages(document, provenance.created_utc, *folder); !done) {
-    return fail(done.error());
-  }
+  const std::string result = file_text(json);
+  if (auto done = folder->write("result.json", result); !done) return fail(done.error());
+  const Calibration shared = shared_chapters(*calibration);
+  const ScalarResults scalar{*calibration, source};
+  CertificateInput input{*description, shared, provenance, nullptr, {}};
+  input.laboratory = style.laboratory;
+  input.language = style.language;
+  input.result_sha256 = sha256(result);
+  input.signing = style.signing ? &*style.signing : nullptr;
+  input.scalar = &scalar;
+  if (auto done = write_certificate(input, *folder); !done) return fail(done.error());
   if (auto done = folder->publish(); !done) return fail(done.error());
 
   ScalarOutcome outcome{*std::move(calibration), ExitCode::done, {}};

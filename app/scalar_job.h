@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <string>
 
+#include "app/certificate/scalar_results.h"
+#include "app/certificate/style.h"
 #include "app/exit_code.h"
-#include "app/provenance.h"
-#include "estimator/scalar/calibrate_scalar.h"
 
 namespace plumbline::app {
 
@@ -20,22 +20,16 @@ struct ScalarFiles {
   bool skip_bad_rows = false;
 };
 
-/// How the rests were found, and in which unit the readings are.
-struct ScalarSource {
-  std::string rests;         ///< one sentence
-  std::string reading_unit;  ///< "V", "g", "LSB" or "unit", from the column's name
-  PerAxis<std::string> columns;
-};
-
 struct ScalarOutcome {
   ScalarCalibration calibration;
   ExitCode exit_code = ExitCode::done;
   std::string summary;  ///< for a person; the last line says what came out
 };
 
-/// Reads, calibrates and writes result.json and certificate.html into `out`: both or, on failure,
+/// Reads, calibrates and writes result.json and the certificate into `out`: all or, on failure,
 /// none.
 Result<ScalarOutcome> calibrate_scalar_files(const ScalarFiles& files,
+                                             const CertificateStyle& style,
                                              const std::filesystem::path& out, std::uint64_t seed);
 
 /// The detector of rests in words, for help and certificate.

@@ -150,7 +150,10 @@ std::string summary(const RunDescription& description, const Calibration& calibr
       text += fmt::format("to tell {} apart: {}{}\n", effect.id, effect.separate_by,
                           effect.separating_plan.stops.empty() ? "" : " (separate.csv)");
   }
-  text += fmt::format("decision: {}\n", to_words(calibration.decision.status));
+  const Decision& decision = calibration.decision;
+  const bool withheld = decision.status == DecisionStatus::none && decision.limit_mps2 > 0;
+  text += fmt::format("decision: {}\n",
+                      withheld ? "NONE, THE RUN WAS NOT FINISHED" : to_words(decision.status));
   return text + conclusion(description, calibration, verification) + "\n";
 }
 

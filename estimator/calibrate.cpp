@@ -260,21 +260,14 @@ void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_pe
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
   u_floor_mps2 = 0;
 
-  // Powers at zero are held there.
-  std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < work.pooled.power.size(); ++i)
-    if (work.pooled.power(i) > 0) free.push_back(i);
-  if (!work.noise_known || free.empty() || work.pooled.information.size() == 0) return;
-  Eigen::VectorXd slope(std::ssize(free));
+  const std::vector<Eigen::Index>& present = work.test.present;
+  if (!work.noise_known || present.empty()) return;
+  Eigen::VectorXd slope(std::ssize(present));
   for (Eigen::Index i = 0; i < slope.size(); ++i)
     slope(i) = expected_mean_square_V2(
         experiment.A, work.fit.gain,
-        experiment.processes.unit[static_cast<std::size_t>(free[static_cast<std::size_t>(i)])]);
-  const Eigen::MatrixXd information = work.pooled.information(free, free);
-  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  const Eigen::VectorXd right = scale.cwiseProduct(slope);
-  const double variance = right.dot(scaled.ldlt().solve(right));
+        experiment.processes.unit[static_cast<std::size_t>(present[static_cast<std::size_t>(i)])]);
+  const double variance = propagated_variance(work.test.information, slope);
   u_floor_mps2 =
       std::abs(mps2_per_V) * std::sqrt(std::max(variance, 0.0)) / (2.0 * std::sqrt(mean_square));
 }

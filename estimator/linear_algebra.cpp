@@ -2,10 +2,15 @@
 
 #include <cblas.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <cassert>
+#include <limits>
 
 // OpenBLAS holds LAPACK, too; its header is a package of its own.
 extern "C" void dpotri_(const char* triangle, const int* n, double* a, const int* lda, int* info);
+extern "C" void dtrtri_(const char* triangle, const char* diagonal, const int* n, double* a,
+                        const int* lda, int* info);
 
 namespace plumbline {
 namespace {
@@ -28,6 +33,28 @@ Eigen::MatrixXd inverse_from_factor(Eigen::MatrixXd lower) {
   assert(info == 0);
   lower.triangularView<Eigen::StrictlyUpper>() = lower.transpose();
   return lower;
+}
+
+Eigen::MatrixXd inverse_of_triangle(Eigen::MatrixXd lower) {
+  const int n = static_cast<int>(lower.rows());
+  int info = 0;
+  dtrtri_("L", "N", &n, lower.data(), &n, &info);
+  if (info != 0) lower.setConstant(std::numeric_limits<double>::quiet_NaN());
+  return lower;
+}
+
+double propagated_variance(const Eigen::MatrixXd& information, const Eigen::VectorXd& slope) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
+  const Eigen::VectorXd right = scale.cwiseProduct(slope);
+  return right.dot(scaled.ldlt().solve(right));
+}
+
+Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns) {
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(
+      columns * columns.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal());
+  qr.setThreshold(1e-8);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
 }
 
 }  // namespace plumbline

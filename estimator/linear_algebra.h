@@ -15,4 +15,16 @@ bool linear_algebra_is_thread_safe();
 /// upper triangle is not looked at (LAPACK's dpotri: half the work of solving for the unit matrix).
 Eigen::MatrixXd inverse_from_factor(Eigen::MatrixXd lower);
 
+/// Inverse of a lower triangular n × n matrix whose strict upper triangle is zero; all NaN where
+/// there is none.
+Eigen::MatrixXd inverse_of_triangle(Eigen::MatrixXd lower);
+
+/// slope'·information⁻¹·slope: the variance of what depends with this slope on parameters of this
+/// information. The scales of the parameters may differ by many orders of magnitude.
+double propagated_variance(const Eigen::MatrixXd& information, const Eigen::VectorXd& slope);
+
+/// Orthonormal basis, n × rank, of what the columns span, each brought to length 1 first. Columns
+/// that depend on the others to within 1e-8 add nothing.
+Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns);
+
 }  // namespace plumbline

@@ -41,7 +41,7 @@ void parallel_for(std::size_t count, const Work& work) {
                                 ? 1
                                 : std::max(1U, std::thread::hardware_concurrency());
   // Three like tasks end sooner when two cores share them than when one core has the third alone.
-  const std::size_t threads = cores > 1 && count < 2 * cores ? count : std::min(count, cores);
+  const std::size_t threads = count < 2 * cores ? count : cores;
   std::vector<std::jthread> helpers;
   for (std::size_t i = 1; i < threads; ++i) helpers.emplace_back(run);
   run();

@@ -29,6 +29,7 @@ struct NotFound {
 };
 
 struct SigningKey;
+struct ScalarResults;
 
 struct CertificateInput {
   const RunDescription& description;
@@ -43,6 +44,8 @@ struct CertificateInput {
   std::string finished_utc = {};
   std::vector<NotFound> not_found = {};
   const SigningKey* signing = nullptr;  ///< signs the XML; none: it is not signed
+  /// A calibration without angles; `calibration` is then shared_chapters() of it.
+  const ScalarResults* scalar = nullptr;
 };
 
 /// "PL-A-0017-20260131-1a2b3c4d": serial, date, and the first digits of the hash over the inputs.
@@ -56,8 +59,16 @@ struct PerformanceDates {
 };
 PerformanceDates performance_dates(const CertificateInput& input);
 
-/// The document in reading order. `input.calibration` must have full rank. `tr` decides the
-/// language; input.language is what callers make it from.
+/// Kind of the event that says that the run did not finish.
+inline constexpr const char* kIncomplete = "incomplete";
+bool is_unfinished(const std::vector<CertificateEvent>& events);
+
+/// What may be stated of a decision: the poses that a run never reached may hold the largest error,
+/// so that one that did not finish can fail, but not pass. Without a status the numbers stay.
+Decision stated_decision(Decision decision, const std::vector<CertificateEvent>& events);
+
+/// The document in reading order. `input.calibration` must have full rank unless it is scalar. `tr`
+/// decides the language; input.language is what callers make it from.
 Document make_certificate(const CertificateInput& input, const Translator& tr);
 Document make_certificate(const CertificateInput& input);
 

@@ -50,14 +50,6 @@ Result<void> write_certificate(const CertificateInput& input, OutputFolder& fold
   return {};
 }
 
-Result<void> write_pages(const Document& document, const std::string& created_utc,
-                         OutputFolder& folder) {
-  const auto pdf = pages_of(document, created_utc);
-  if (!pdf) return fail(pdf.error());
-  if (auto done = folder.write("certificate.html", write_html(document)); !done) return done;
-  return folder.write("certificate.pdf", *pdf);
-}
-
 Result<void> certificate_can_be_written() {
   if (auto typeface = Typeface::load(); !typeface) return fail(typeface.error());
   return {};

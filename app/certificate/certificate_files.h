@@ -13,10 +13,6 @@ namespace plumbline::app {
 /// or the folder cannot be written.
 Result<void> write_certificate(const CertificateInput& input, OutputFolder& folder);
 
-/// certificate.html and certificate.pdf of a document that has no digital form.
-Result<void> write_pages(const Document& document, const std::string& created_utc,
-                         OutputFolder& folder);
-
 /// Success when the fonts of the PDF are there; for asking before a long measurement.
 Result<void> certificate_can_be_written();
 

@@ -15,6 +15,19 @@ namespace plumbline::app {
 
 namespace content {
 
+std::size_t Composer::figures() const {
+  return static_cast<std::size_t>(
+      std::count_if(document.blocks.begin(), document.blocks.end(),
+                    [](const Block& block) { return std::holds_alternative<Figure>(block); }));
+}
+
+void Composer::add(Block block) const {
+  if (auto* figure = std::get_if<Figure>(&block)) {
+    figure->caption = tr("Figure {}. {}", figures() + 1, figure->caption);
+  }
+  document.blocks.push_back(std::move(block));
+}
+
 std::string parameter_name(std::size_t axis, Eigen::Index column) {
   return column == 3
              ? fmt::format("U_{}0", kAxisName[axis])
@@ -50,11 +63,14 @@ bool suspicious(Verdict verdict) {
 
 std::string headline(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
-  if (calibration.decision.status != DecisionStatus::none) {
-    return c.tr(to_words(calibration.decision.status));
+  const DecisionStatus status = stated_decision(calibration.decision, c.input.events).status;
+  if (is_unfinished(c.input.events)) {
+    return status == DecisionStatus::none ? c.tr("Run not finished")
+                                          : c.tr("Run not finished: {}", c.tr(to_words(status)));
   }
-  return suspicious(calibration.diagnosis.verdict) ? c.tr("Calibrated, residual too large")
-                                                   : c.tr("Calibrated");
+  if (status != DecisionStatus::none) return c.tr(to_words(status));
+  if (suspicious(calibration.diagnosis.verdict)) return c.tr("Calibrated, residual too large");
+  return c.input.scalar != nullptr ? c.tr("Calibrated without angles") : c.tr("Calibrated");
 }
 
 /// What was found, in a sentence that needs no symbols.
@@ -69,17 +85,26 @@ std::string finding(const Composer& c) {
     names += (names.empty() ? "" : "; ") + unlisted_name(unlisted, c.tr) + " (" +
              axes_text(unlisted.axes) + ")";
   }
+  const bool nine = c.input.scalar != nullptr;
   switch (diagnosis.verdict) {
     case Verdict::clean:
-      return c.tr("The twelve parameters describe the unit; nothing stands out of the noise.");
+      return nine
+                 ? c.tr("The nine parameters describe the unit; nothing stands out of the noise.")
+                 : c.tr(
+                       "The twelve parameters describe the unit; nothing stands out of the noise.");
     case Verdict::explained:
-      return c.tr("The twelve parameters alone do not describe the unit. Added to the model: {}.",
-                  names);
-    case Verdict::partly_explained:
-      return c.tr(
-          "The twelve parameters alone do not describe the unit. Added to the model: {}. Something "
-          "remains that this does not explain.",
-          names);
+    case Verdict::partly_explained: {
+      const std::string added =
+          nine
+              ? c.tr("The nine parameters alone do not describe the unit. Added to the model: {}.",
+                     names)
+              : c.tr(
+                    "The twelve parameters alone do not describe the unit. Added to the model: {}.",
+                    names);
+      return diagnosis.verdict == Verdict::explained
+                 ? added
+                 : added + " " + c.tr("Something remains that this does not explain.");
+    }
     case Verdict::unexplained:
       return c.tr("The model lacks something that could not be traced.");
     case Verdict::undetermined:
@@ -114,12 +139,13 @@ void add_summary(const Composer& c) {
                       : Tone::plain;
   document.headline = headline(c);
   for (const CertificateEvent& event : c.input.events) {
-    if (event.kind != "incomplete") continue;
+    if (event.kind != kIncomplete) continue;
     document.tone = Tone::warning;
     document.summary.push_back(sentence(c.tr.phrase(event.text)));
   }
   document.summary.push_back(finding(c));
-  document.summary.push_back(error_sentence(c));
+  document.summary.push_back(c.input.scalar != nullptr ? scalar_error_sentence(c)
+                                                       : error_sentence(c));
   if (c.input.verification != nullptr) {
     const auto worst = [](const PerAxis<double>& v) {
       return *std::max_element(v.begin(), v.end());
@@ -134,6 +160,10 @@ void add_summary(const Composer& c) {
 
 void add_figures(const Composer& c) {
   c.add(Heading{c.tr("Pictures of the residual")});
+  c.add(Paragraph{
+      c.tr("Figures {} to {}: what the model leaves of every pose, measured less calculated and "
+           "referred to the input.",
+           c.figures() + 1, c.figures() + 3)});
   const FigureContext context{c.calibration, c.tr};
   c.add(residual_map(context, c.input.description.grid));
   c.add(residual_histogram(context));
@@ -161,15 +191,29 @@ PerformanceDates performance_dates(const CertificateInput& input) {
   return dates;
 }
 
+bool is_unfinished(const std::vector<CertificateEvent>& events) {
+  return std::any_of(events.begin(), events.end(),
+                     [](const CertificateEvent& event) { return event.kind == kIncomplete; });
+}
+
+Decision stated_decision(Decision decision, const std::vector<CertificateEvent>& events) {
+  const bool passes = decision.status == DecisionStatus::pass ||
+                      decision.status == DecisionStatus::conditional_pass;
+  if (passes && is_unfinished(events)) decision.status = DecisionStatus::none;
+  return decision;
+}
+
 Document make_certificate(const CertificateInput& input, const Translator& tr) {
   Document document;
   const content::Composer composer{document, input, tr,
                                    std::make_shared<const Calibration>(input.calibration)};
   document.language = code_of(tr.language());
   document.title = tr("Calibration certificate");
-  document.subtitle =
-      tr("Accelerometer triad, serial number {}",
-         input.description.dut.serial.empty() ? tr("not stated") : input.description.dut.serial);
+  const std::string serial =
+      input.description.dut.serial.empty() ? tr("not stated") : input.description.dut.serial;
+  document.subtitle = input.scalar != nullptr
+                          ? tr("Accelerometer triad, serial number {}; scalar calibration", serial)
+                          : tr("Accelerometer triad, serial number {}", serial);
   document.id = certificate_id(input.provenance);
   document.words.missing = tr("not stated");
   document.words.page_of = tr("page {} of {}");
@@ -177,14 +221,23 @@ Document make_certificate(const CertificateInput& input, const Translator& tr) {
   content::add_summary(composer);
   content::add_identification(composer);
   content::add_method(composer);
-  content::add_parameters(composer);
-  content::add_errors(composer);
-  content::add_findings(composer);
-  content::add_decision(composer);
-  content::add_budget(composer);
-  content::add_estimators(composer);
-  content::add_figures(composer);
-  content::add_noise(composer);
+  if (input.scalar != nullptr) {
+    content::add_scalar_results(composer);
+    content::add_scalar_errors(composer);
+    content::add_findings(composer);
+    content::add_decision(composer);
+    content::add_scalar_budget(composer);
+    content::add_noise(composer);
+  } else {
+    content::add_parameters(composer);
+    content::add_errors(composer);
+    content::add_findings(composer);
+    content::add_decision(composer);
+    content::add_budget(composer);
+    content::add_estimators(composer);
+    content::add_figures(composer);
+    content::add_noise(composer);
+  }
   content::add_history(composer);
   document.colophon =
       tr("The results relate only to the item calibrated. This certificate may not be reproduced "

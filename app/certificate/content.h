@@ -15,7 +15,9 @@ struct Composer {
   const Translator& tr;
   std::shared_ptr<const Calibration> calibration;  ///< what figures keep
 
-  void add(Block block) const { document.blocks.push_back(std::move(block)); }
+  /// Figures are numbered: on paper one may stand where there is room.
+  void add(Block block) const;
+  std::size_t figures() const;  ///< so far
 };
 
 void add_identification(const Composer& composer);
@@ -28,6 +30,13 @@ void add_findings(const Composer& composer);
 void add_noise(const Composer& composer);
 void add_decision(const Composer& composer);
 void add_history(const Composer& composer);
+
+// A calibration without angles (composer.input.scalar) says these in their place.
+std::string scalar_error_sentence(const Composer& composer);
+std::string scalar_method(const Composer& composer);
+void add_scalar_results(const Composer& composer);
+void add_scalar_errors(const Composer& composer);
+void add_scalar_budget(const Composer& composer);
 
 /// "K_xy"; column 3: "U_x0".
 std::string parameter_name(std::size_t axis, Eigen::Index column);

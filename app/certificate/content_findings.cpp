@@ -1,6 +1,7 @@
 // Errors before and after, what was found in the residual, noise, conformity.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "app/certificate/content.h"
@@ -19,6 +20,21 @@ bool enlarged(const Calibration& calibration) {
 double scale_mps2(const Calibration& calibration, std::size_t axis) {
   return kStandardGravity_mps2 /
          std::abs(calibration.final.batch_ls[axis].value(static_cast<Eigen::Index>(axis)));
+}
+
+/// A definition in a file has lines of its own.
+std::string one_line(const std::string& text) {
+  std::string line;
+  for (const char ch : text) {
+    const bool space = ch == '\n' || ch == '\t' || ch == ' ';
+    if (!space) {
+      line += ch;
+    } else if (!line.empty() && line.back() != ' ') {
+      line += ' ';
+    }
+  }
+  while (line.ends_with(' ')) line.pop_back();
+  return line;
 }
 
 /// "0.004" or "< 0.001": a p-value far below what it is compared with says no more.
@@ -54,6 +70,19 @@ void add_effect_table(const Composer& c) {
   c.add(std::move(table));
 }
 
+/// What the parameters of the added effects stand for.
+void add_terms(const Composer& c) {
+  Facts facts;
+  for (const FoundEffect& effect : c.input.calibration.diagnosis.effects) {
+    const std::string term =
+        effect.definition.empty() ? effect_term(effect.id, c.tr) : one_line(effect.definition);
+    if (!term.empty()) facts.rows.emplace_back(effect_name(effect.id, c.tr), term);
+  }
+  if (facts.rows.empty()) return;
+  c.add(Paragraph{c.tr("The added terms; a in g, those of an output referred to its input:")});
+  c.add(std::move(facts));
+}
+
 void add_alternatives(const Composer& c) {
   const Diagnosis& diagnosis = c.input.calibration.diagnosis;
   Facts facts;
@@ -86,7 +115,7 @@ void add_not_found(const Composer& c) {
     const std::string unit = printed_unit(item.unit);
     table.rows.push_back({effect_name(item.id, c.tr),
                           item.axes.empty() ? "–" : axes_text(item.axes), item.parameter,
-                          significant(item.limit, 2) + (unit.empty() ? "" : " " + unit)});
+                          significant(item.limit, 2) + before_unit(unit) + unit});
   }
   c.add(std::move(table));
 }
@@ -136,17 +165,34 @@ void add_errors(const Composer& c) {
   row(c.tr("standard uncertainty of the expected RMS"), calibration.u_floor_pose_rms_mps2,
       calibration.u_floor_pose_rms_mps2);
   c.add(std::move(table));
+  if (!both) return;
+  c.add(Paragraph{c.tr("Before: with the twelve parameters alone. After: with the added effects as "
+                       "well. The calibration adjusts nothing at the unit itself."),
+                  Tone::note});
 }
 
 void add_findings(const Composer& c) {
   const Diagnosis& diagnosis = c.input.calibration.diagnosis;
   c.add(Heading{c.tr("What the residual shows")});
-  c.add(Paragraph{c.tr("Verdict: {}. {} p {} for noise alone.", c.tr(to_string(diagnosis.verdict)),
-                       sentence(c.tr.phrase(diagnosis.reason)),
-                       (diagnosis.p_value < 1e-6 ? "" : "= ") + p_value_text(diagnosis.p_value)),
-                  diagnosis.verdict == Verdict::unexplained ? Tone::warning : Tone::plain});
+  std::string verdict = to_string(diagnosis.verdict);
+  std::replace(verdict.begin(), verdict.end(), '_', ' ');
+  // The effects follow as a table, with expanded uncertainties.
+  const std::string reason = diagnosis.reason.substr(0, diagnosis.reason.find("; explained by "));
+  const std::string p_value =
+      (diagnosis.p_value < 1e-6 ? "" : "= ") + p_value_text(diagnosis.p_value);
+  const std::string pattern =
+      c.input.scalar == nullptr
+          ? c.tr("Verdict: {}. {} p {} for noise alone.")
+          : c.tr("Verdict: {}. {} p {} for the noise inside the rests alone.");
+  std::string text =
+      fmt::format(fmt::runtime(pattern), c.tr(verdict), sentence(c.tr.phrase(reason)), p_value);
+  if (reason.find("±") != std::string::npos) {
+    text += " " + c.tr("± gives standard uncertainties here.");
+  }
+  c.add(Paragraph{text, diagnosis.verdict == Verdict::unexplained ? Tone::warning : Tone::plain});
   if (enlarged(c.input.calibration)) {
     add_effect_table(c);
+    add_terms(c);
     add_alternatives(c);
     c.add(evidence_figure({c.calibration, c.tr}));
   }
@@ -165,6 +211,7 @@ void add_noise(const Composer& c) {
   table.word_columns = {6, 7};
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const NoiseModel& noise = calibration.noise[i];
+    const auto terms = reported_terms(noise);
     const double scale = scale_mps2(calibration, i);
     const bool known = noise.source != "none";
     const auto term = [&](const NoiseTerm& t) {
@@ -175,8 +222,8 @@ void add_noise(const Composer& c) {
       const RoundedResult r = round_result(t.value * scale, t.u * scale);
       return r.value + " ± " + r.uncertainty;
     };
-    table.rows.push_back({kAxisName[i], term(noise.Q), term(noise.N), term(noise.B), term(noise.K),
-                          term(noise.R),
+    table.rows.push_back({kAxisName[i], term(terms[kTermQ]), term(terms[kTermN]),
+                          term(terms[kTermB]), term(terms[kTermK]), term(terms[kTermR]),
                           !known           ? "–"
                           : noise.adequate ? c.tr("adequate")
                                            : c.tr("not adequate"),
@@ -189,18 +236,24 @@ void add_noise(const Composer& c) {
         c.tr("Noise of the {} axis: {}.", kAxisName[i], c.tr.phrase(calibration.noise[i].remark)),
         Tone::note});
   }
-  c.add(allan_figure({c.calibration, c.tr}));
+  const bool recorded = std::any_of(calibration.noise.begin(), calibration.noise.end(),
+                                    [](const auto& n) { return n.oadev.value.size() > 1; });
+  // A calibration without angles has no static record of its own.
+  if (recorded || c.input.scalar == nullptr) c.add(allan_figure({c.calibration, c.tr}));
 }
 
 void add_decision(const Composer& c) {
-  const Decision& decision = c.input.calibration.decision;
+  const Decision decision = stated_decision(c.input.calibration.decision, c.input.events);
+  const bool stated = decision.status != DecisionStatus::none;
   c.add(Heading{c.tr("Statement of conformity")});
-  if (decision.status == DecisionStatus::none) {
+  if (!stated && !(decision.limit_mps2 > 0)) {
     c.add(Paragraph{c.tr("No acceptance limit was given; no statement of conformity is made.")});
     return;
   }
   Facts facts;
-  facts.rows = {{c.tr("Decision"), c.tr(to_words(decision.status))},
+  facts.rows = {{c.tr("Decision"), stated ? c.tr(to_words(decision.status))
+                                          : c.tr("none: the run was not finished, and what it did "
+                                                 "not reach may hold the largest error")},
                 {c.tr("Limit"), c.tr("largest error {} mm/s²", milli_mps2(decision.limit_mps2))},
                 {c.tr("Measured value"),
                  c.tr("largest error {} mm/s², standard uncertainty {} mm/s²",

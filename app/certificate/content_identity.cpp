@@ -6,6 +6,7 @@
 
 #include "app/certificate/content.h"
 #include "app/certificate/rounding.h"
+#include "app/certificate/scalar_results.h"
 
 namespace plumbline::app::content {
 namespace {
@@ -45,6 +46,7 @@ std::string location_text(const Composer& c) {
   if (place == "customer") return c.tr("at the customer's");
   if (place == "laboratoryBranch") return c.tr("in a branch of the laboratory");
   if (place == "customerBranch") return c.tr("in a branch of the customer");
+  if (place.empty()) return "";
   return c.tr("elsewhere");
 }
 
@@ -75,41 +77,59 @@ void add_identification(const Composer& c) {
   c.add(std::move(facts));
 }
 
+namespace {
+
+std::string gravity_text(const Composer& c) {
+  const auto& gravity = c.input.description.gravity;
+  if (!(gravity.u_mps2 > 0)) {
+    return c.tr("g = {} m/s²; uncertainty not stated", significant(gravity.local_mps2, 7));
+  }
+  return fmt::format("g = {}, k = 2",
+                     result_with_unit(gravity.local_mps2, 2 * gravity.u_mps2, "m/s²"));
+}
+
+}  // namespace
+
 void add_method(const Composer& c) {
   const RunDescription& run = c.input.description;
   const Laboratory& lab = c.input.laboratory;
   const Calibration& calibration = c.input.calibration;
+  const bool scalar = c.input.scalar != nullptr;
   c.add(Heading{c.tr("Method and conditions")});
   Facts facts;
   facts.rows = {
       {c.tr("Method"),
-       c.tr("multipoint tumble test in the field of gravity on a two-axis dividing head, {} "
-            "positions, {} readings; estimated by weighted least squares, recursive least squares "
-            "and an eight-state Kalman filter",
-            calibration.poses, calibration.samples)},
+       scalar ? scalar_method(c)
+              : c.tr("multipoint tumble test in the field of gravity on a two-axis dividing head, "
+                     "{} positions, {} readings; estimated by weighted least squares, recursive "
+                     "least squares and an eight-state Kalman filter",
+                     calibration.poses, calibration.samples)},
       {c.tr("Procedure"), lab.procedure},
       {c.tr("Deviations from the procedure"), lab.deviations},
-      {c.tr("Traceability of the angles"), source_text(c, lab.head)},
-      {c.tr("Traceability of gravity"), source_text(c, lab.gravity)},
-      {c.tr("Local gravity"),
-       run.gravity.u_mps2 > 0
-           ? fmt::format("g = {}, k = 2",
-                         result_with_unit(run.gravity.local_mps2, 2 * run.gravity.u_mps2, "m/s²"))
-           : c.tr("g = {} m/s²; uncertainty not stated", significant(run.gravity.local_mps2, 7))},
-      {c.tr("Positioning of the head"),
-       run.angles.delta_arcsec > 0 || run.angles.h_arcsec > 0
-           ? c.tr("standard uncertainty {}″ in δ and {}″ in h",
-                  significant(run.angles.delta_arcsec, 3), significant(run.angles.h_arcsec, 3))
-           : ""},
-      {c.tr("Converter"), run.adc
-                              ? c.tr("{} bits from {} V to {} V, step {} µV", run.adc->bits,
-                                     significant(run.adc->min_V, 4), significant(run.adc->max_V, 4),
-                                     significant(1e6 * run.adc->lsb_V(), 4))
-                              : c.tr("not described; nothing is assumed about quantization")},
-      {c.tr("Reference temperature"), fmt::format("{} °C", significant(run.reference_C, 3))},
-      {c.tr("Temperature during the run"), temperature_range(calibration)},
-      {c.tr("Conditions in the room"), lab.ambient},
   };
+  if (!scalar)
+    facts.rows.emplace_back(c.tr("Traceability of the angles"), source_text(c, lab.head));
+  facts.rows.emplace_back(c.tr("Traceability of gravity"), source_text(c, lab.gravity));
+  facts.rows.emplace_back(c.tr("Local gravity"), gravity_text(c));
+  if (scalar) {
+    facts.rows.emplace_back(c.tr("Rests"), c.tr.phrase(c.input.scalar->source.rests));
+  } else {
+    facts.rows.insert(
+        facts.rows.end(),
+        {{c.tr("Positioning of the head"),
+          run.angles.delta_arcsec > 0 || run.angles.h_arcsec > 0
+              ? c.tr("standard uncertainty {}″ in δ and {}″ in h",
+                     significant(run.angles.delta_arcsec, 3), significant(run.angles.h_arcsec, 3))
+              : ""},
+         {c.tr("Converter"),
+          run.adc ? c.tr("{} bits from {} V to {} V, step {} µV", run.adc->bits,
+                         significant(run.adc->min_V, 4), significant(run.adc->max_V, 4),
+                         significant(1e6 * run.adc->lsb_V(), 4))
+                  : c.tr("not described; nothing is assumed about quantization")},
+         {c.tr("Reference temperature"), fmt::format("{} °C", significant(run.reference_C, 3))},
+         {c.tr("Temperature during the run"), temperature_range(calibration)}});
+  }
+  facts.rows.emplace_back(c.tr("Conditions in the room"), lab.ambient);
   c.add(std::move(facts));
 }
 

@@ -187,9 +187,10 @@ void add_budget_rows(const Composer& c, const Budget& budget, Table& table) {
          significant(1e3 * line.contribution, 2), fmt::format("{:.1f} %", 100 * line.share)});
     first = false;
   }
-  table.rows.push_back({"", c.tr("combined; U = {} {}", significant(2e3 * budget.u, 2), unit),
-                        significant(1e3 * budget.value, 6) + " " + unit, c.tr("normal"), "",
-                        degrees_of_freedom(budget.dof_effective), "",
+  table.rows.push_back({"", c.tr("combined"), significant(1e3 * budget.value, 6) + " " + unit,
+                        c.tr("normal"),
+                        fmt::format("U = {} {}", significant(2e3 * budget.u, 2), unit),
+                        degrees_of_freedom(budget.dof_effective), "k = 2",
                         significant(1e3 * budget.u, 2), "100.0 %"});
 }
 
@@ -209,8 +210,6 @@ void add_parameters(const Composer& c) {
 void add_budget(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
   c.add(Heading{c.tr("Uncertainty budget")});
-  const FigureContext context{c.calibration, c.tr};
-  c.add(budget_figure(context, c.input.description));
   Table table;
   table.caption = c.tr("Scale factors and offsets (GUM, JCGM 100:2008), U with k = 2");
   table.header = {c.tr("parameter"), c.tr("quantity"), c.tr("estimate"), c.tr("distribution"),
@@ -228,6 +227,7 @@ void add_budget(const Composer& c) {
            "converter, the repeatability of the unit within the run, and what estimating the "
            "added effects together with the parameters costs."),
       Tone::note});
+  c.add(budget_figure({c.calibration, c.tr}, c.input.description));
   add_monte_carlo(c);
 }
 

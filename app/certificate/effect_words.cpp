@@ -10,60 +10,103 @@
 namespace plumbline::app {
 namespace {
 
-constexpr std::array<std::pair<const char*, const char*>, 30> kNames = {{
-    {"sensor.quadratic", "second-order nonlinearity (K2)"},
-    {"sensor.cubic", "third-order nonlinearity (K3)"},
-    {"sensor.asymmetry", "scale factor asymmetry"},
-    {"sensor.cross_product", "cross-coupling of two axes (Kip, Kio, Kpo)"},
-    {"sensor.hysteresis", "hysteresis"},
-    {"sensor.temperature_bias", "bias that follows the temperature"},
-    {"sensor.temperature_scale", "scale factor that follows the temperature"},
-    {"sensor.warmup", "warm-up of the bias"},
-    {"sensor.drift", "drift of the bias with time"},
-    {"sensor.scale_drift", "drift of the scale factor with time"},
-    {"sensor.bias_step", "step of the bias"},
-    {"sensor.settling", "slow settling after a change of position"},
-    {"sensor.dead_zone", "dead zone around zero"},
-    {"sensor.saturation", "saturation"},
-    {"adc.quantization", "quantization by the converter"},
-    {"adc.code_step", "step at one code boundary of the converter"},
-    {"adc.stuck_bit", "stuck bit of the converter"},
-    {"adc.mains_pickup", "mains pickup"},
-    {"rig.base_roll", "tilt of the base about the spindle's direction"},
-    {"rig.tilt_index", "index error of the tilt axis"},
-    {"rig.axis_skew", "spindle not perpendicular to the tilt axis"},
-    {"rig.delta_eccentricity", "eccentricity of the spindle's circle"},
-    {"rig.delta_ellipticity", "ellipticity of the spindle's circle"},
-    {"rig.delta_periodic", "periodic error of the spindle"},
-    {"rig.h_scale", "scale error of the tilt axis"},
-    {"rig.h_eccentricity", "eccentricity of the tilt circle"},
-    {"rig.backlash", "backlash of the spindle"},
-    {"rig.index_slip", "slip of the spindle's index"},
-    {"rig.pose_outlier", "poses at a wrong angle"},
-    {"env.base_field", "field fixed to the base (a magnetic one, say)"},
+struct EffectWords {
+  const char* id;
+  const char* name;
+  const char* term;  ///< as in the model; `a` in g
+};
+
+constexpr std::array<EffectWords, 30> kEffects = {{
+    {"sensor.quadratic", "second-order nonlinearity (K2)", "k2·a_i²"},
+    {"sensor.cubic", "third-order nonlinearity (K3)", "k3·a_i³"},
+    {"sensor.asymmetry", "scale factor asymmetry", "ka·|a_i|"},
+    {"sensor.cross_product", "cross-coupling of two axes (Kip, Kio, Kpo)",
+     "k_xy·a_x·a_y + k_xz·a_x·a_z + k_yz·a_y·a_z"},
+    {"sensor.hysteresis", "hysteresis",
+     "+w/2 where a_i rose on the way to the position, −w/2 where it fell; start: how the first "
+     "position was "
+     "reached"},
+    {"sensor.temperature_bias", "bias that follows the temperature", "b1·(T − T₀)"},
+    {"sensor.temperature_scale", "scale factor that follows the temperature", "s1·(T − T₀)·a_i"},
+    {"sensor.warmup", "warm-up of the bias", "b·exp(−t/tau)"},
+    {"sensor.drift", "drift of the bias with time", "d·t"},
+    {"sensor.scale_drift", "drift of the scale factor with time", "s·t·a_i"},
+    {"sensor.bias_step", "step of the bias", "b from t = t0 on"},
+    {"sensor.settling", "slow settling after a change of position",
+     "c·(a_i of the position before − a_i)·exp(−t/tau), t since the arrival"},
+    {"sensor.dead_zone", "dead zone around zero",
+     "no response while the specific force along the axis is within ±w"},
+    {"sensor.saturation", "saturation", "clipped at ±L"},
+    {"adc.quantization", "quantization by the converter", "rounding to steps of lsb"},
+    {"adc.code_step", "step at one code boundary of the converter", "c·sign(U_i − at)"},
+    {"adc.stuck_bit", "stuck bit of the converter", "the bit of the code always has the value"},
+    {"adc.mains_pickup", "mains pickup", "amplitude·sin(2π·f·t + phase) in every reading"},
+    {"rig.base_roll", "tilt of the base about the spindle's direction",
+     "base tilted about the direction of the spindle by epsilon"},
+    {"rig.tilt_index", "index error of the tilt axis", "h + epsilon"},
+    {"rig.axis_skew", "spindle not perpendicular to the tilt axis",
+     "spindle off the perpendicular to the tilt axis by eta"},
+    {"rig.delta_eccentricity", "eccentricity of the spindle's circle", "δ + c·cos δ + s·sin δ"},
+    {"rig.delta_ellipticity", "ellipticity of the spindle's circle", "δ + c·cos 2δ + s·sin 2δ"},
+    {"rig.delta_periodic", "periodic error of the spindle", "δ + c·cos nδ + s·sin nδ"},
+    {"rig.h_scale", "scale error of the tilt axis", "h·(1 + k)"},
+    {"rig.h_eccentricity", "eccentricity of the tilt circle", "h + c·cos h + s·sin h"},
+    {"rig.backlash", "backlash of the spindle",
+     "δ ± w/2 by the direction in which δ was approached; way 0: the shorter way round, 1: never "
+     "past "
+     "360°; start: how the first angle was reached"},
+    {"rig.index_slip", "slip of the spindle's index",
+     "δ + epsilon from the position numbered pose on"},
+    {"rig.pose_outlier", "poses at a wrong angle", "δ + delta and h + h at single positions"},
+    {"env.base_field", "field fixed to the base (a magnetic one, say)",
+     "m1 and m2 times the horizontal axes of the base as the triad sees them"},
 }};
 
+constexpr std::string_view kCovariate = "covariate:";
+
+const EffectWords* words_of(const std::string& id) {
+  const auto* it = std::find_if(kEffects.begin(), kEffects.end(),
+                                [&](const EffectWords& words) { return id == words.id; });
+  return it == kEffects.end() ? nullptr : it;
+}
+
 std::string one_name(const std::string& id, const Translator& tr) {
-  const auto* it = std::find_if(kNames.begin(), kNames.end(),
-                                [&](const auto& entry) { return id == entry.first; });
-  if (it != kNames.end()) return tr(it->second);
-  constexpr std::string_view kCovariate = "covariate:";
+  if (const EffectWords* words = words_of(id)) return tr(words->name);
   if (id.starts_with(kCovariate)) {
     return tr("influence of the recorded column {}", id.substr(kCovariate.size()));
   }
   return id;
 }
 
-}  // namespace
+std::string one_term(const std::string& id, const Translator& tr) {
+  if (const EffectWords* words = words_of(id)) return tr(words->term);
+  if (!id.starts_with(kCovariate)) return {};
+  return tr(
+      "c·(v − mean) with c in g per unit, c·(v − mean)·a_i with c per unit; v is the column {}",
+      id.substr(kCovariate.size()));
+}
 
-std::string effect_name(const std::string& id, const Translator& tr) {
+/// Of the members of a sum of effects.
+std::string member_by_member(const std::string& id, const Translator& tr,
+                             std::string (*words)(const std::string&, const Translator&),
+                             const char* between) {
   std::string text;
   for (std::size_t from = 0; from <= id.size();) {
     const std::size_t to = std::min(id.find('+', from), id.size());
-    text += (text.empty() ? "" : " + ") + one_name(id.substr(from, to - from), tr);
+    text += (text.empty() ? "" : between) + words(id.substr(from, to - from), tr);
     from = to + 1;
   }
   return text;
+}
+
+}  // namespace
+
+std::string effect_name(const std::string& id, const Translator& tr) {
+  return member_by_member(id, tr, one_name, " + ");
+}
+
+std::string effect_term(const std::string& id, const Translator& tr) {
+  return member_by_member(id, tr, one_term, "; ");
 }
 
 std::string axes_text(const std::vector<std::size_t>& axes) {
@@ -85,20 +128,23 @@ std::string printed_unit(std::string unit) {
   return unit;
 }
 
+std::string before_unit(const std::string& unit) { return unit.empty() || unit == "°" ? "" : " "; }
+
 std::string parameter_text(const EffectParameter& parameter) {
   std::string text = parameter.name;
   if (parameter.axis) text += fmt::format(" ({})", kAxisName.at(*parameter.axis));
   const std::string unit = printed_unit(parameter.unit);
   text += " = ";
   if (parameter.u > 0) {
-    text += result_with_unit(parameter.value, 2 * parameter.u, unit);
+    const RoundedResult rounded = round_result(parameter.value, 2 * parameter.u);
+    text +=
+        fmt::format("({} ± {}){}{}", rounded.value, rounded.uncertainty, before_unit(unit), unit);
   } else if (parameter.value == std::round(parameter.value) && std::abs(parameter.value) < 1e6) {
     text += fmt::format("{:.0f}", parameter.value);  // a pose, a bit, an order
-    if (!unit.empty()) text += " " + unit;
+    text += before_unit(unit) + unit;
   } else {
-    text += significant(parameter.value, 6) + (unit.empty() ? "" : " " + unit);
+    text += significant(parameter.value, 6) + before_unit(unit) + unit;
   }
-  while (text.back() == ' ') text.pop_back();
   return text;
 }
 

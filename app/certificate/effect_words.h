@@ -21,6 +21,13 @@ std::string parameter_text(const EffectParameter& parameter);
 /// "g/g²" for "g/g^2": units as they are printed.
 std::string printed_unit(std::string unit);
 
+/// What stands between a value and its printed unit: nothing before ° and where there is none.
+std::string before_unit(const std::string& unit);
+
+/// The term of an effect as a formula with its parameters ("k2·a_i²"), members of a sum one by one;
+/// empty for what has none.
+std::string effect_term(const std::string& id, const Translator& tr);
+
 /// The structure that no listed effect explains, in words.
 std::string unlisted_name(const UnlistedStructure& found, const Translator& tr);
 

@@ -24,11 +24,15 @@ constexpr std::array kPartColors = {"#08519c", "#d55e00", "#e8b35a", "#d9d9d9"};
 Figure allan_figure(const FigureContext& context) {
   Figure figure;
   figure.caption = context.tr(
-      "Overlapping Allan deviation of each output, input-referred (points, with 95 % limits), and "
-      "the sum of the identified noise terms (lines).");
+      "Overlapping Allan deviation of each output, input-referred (points, with 95 % limits), the "
+      "identified terms one by one (broken lines with their names, M a Gauss-Markov process) and "
+      "their sum (full line).");
   figure.description = context.tr("Allan deviation against averaging time for the axes x, y and z");
   figure.width = kFigureWidth;
-  figure.height = 330;
+  const PerAxis<NoiseModel>& noise = context.calibration->noise;
+  const bool recorded = std::any_of(noise.begin(), noise.end(),
+                                    [](const auto& n) { return n.oadev.value.size() > 1; });
+  figure.height = recorded ? 270 : 40;
   figure.draw = [context](Canvas& canvas) {
     const Calibration& calibration = *context.calibration;
     PerAxis<NoiseModel> input_referred = calibration.noise;
@@ -37,22 +41,28 @@ Figure allan_figure(const FigureContext& context) {
       const double scale =
           kStandardGravity_mps2 /
           std::abs(calibration.final.batch_ls[i].value(static_cast<Eigen::Index>(i)));
-      DeviationCurve& curve = input_referred[i].oadev;
-      for (auto* values : {&curve.value, &curve.lower, &curve.upper, &input_referred[i].fitted}) {
+      NoiseModel& model = input_referred[i];
+      DeviationCurve& curve = model.oadev;
+      for (auto* values : {&curve.value, &curve.lower, &curve.upper, &model.fitted}) {
         for (double& value : *values) value *= scale;
       }
+      for (NoiseTerm* term : {&model.Q, &model.N, &model.B, &model.K, &model.R}) {
+        term->value *= scale;
+      }
+      for (NoiseTerm& term : model.record.term) term.value *= scale;
+      for (MarkovTerm& markov : model.record.markov) markov.sigma *= scale;
       if (curve.value.size() > 1) {
         series.push_back({context.tr("{} axis", kAxisName[i]), &input_referred[i]});
       }
     }
     if (series.empty()) {
-      canvas.text({kFigureWidth / 2, 160},
+      canvas.text({kFigureWidth / 2, 24},
                   context.tr("no static record long enough for an Allan deviation"),
                   {12, Anchor::middle});
       return;
     }
-    draw_allan(
-        canvas, {0, 0}, kFigureWidth, 325, series,
+    draw_allan_panels(
+        canvas, {0, 0}, kFigureWidth, 265, series,
         {context.tr("averaging time τ, s"), context.tr("overlapping Allan deviation, {}", "m/s²")});
   };
   return figure;

@@ -30,8 +30,8 @@ h2 { font-size: 17px; margin: 30px 0 8px; border-bottom: 1px solid #999; padding
 .verdict.warning { border-left-color: #d55e00; }
 p.warning { border-left: 5px solid #d55e00; padding-left: 10px; }
 p.note { color: #555; font-size: 13px; }
-table { border-collapse: collapse; width: 100%; margin: 10px 0 16px; font-size: 12.5px;
-        break-inside: avoid; }
+table { border-collapse: collapse; width: 100%; margin: 10px 0 16px; font-size: 12.5px; }
+tr, table:not(:has(tr:nth-child(9))) { break-inside: avoid; }
 caption { text-align: left; font-weight: bold; padding: 4px 0; }
 th, td { padding: 3px 6px; border-bottom: 1px solid #ddd; text-align: right;
          font-variant-numeric: tabular-nums; }
@@ -57,7 +57,12 @@ p.fingerprint { color: #555; overflow-wrap: anywhere; }
   dl { grid-template-columns: minmax(0, 2fr) minmax(0, 3fr); }
 }
 h1, h2, p, caption, figcaption, .id, .verdict, .end { overflow-wrap: anywhere; }
-@media print { body { margin: 0; padding: 0; max-width: none; font-size: 10pt; } }
+@media print {
+  body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
+  table { font-size: 8.3pt; }
+  th, td { padding: 2px 4px; }
+  td.words, th.words { padding-left: 9px; }
+}
 )css";
 
 /// Inside a CSS string, so quotes and backslashes of a serial number must not end it.

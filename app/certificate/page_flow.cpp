@@ -66,6 +66,7 @@ class Flow {
       section({it, end});
       it = end;
     }
+    while (!waiting_.empty()) new_page();
     colophon();
     return std::move(result_);
   }
@@ -76,12 +77,18 @@ class Flow {
   double bottom() const { return paper::kHeight - paper::kBottom; }
   bool fits(double height) const { return y_ + height <= bottom(); }
   bool at_top() const { return y_ <= paper::kTop + 0.01; }
+  /// Pictures that had to wait come first, in their order.
   void new_page() {
     result_.pages.emplace_back();
     y_ = paper::kTop;
+    while (!waiting_.empty() && (at_top() || fits(height_of(*waiting_.front())))) {
+      const Figure& figure = *waiting_.front();
+      waiting_.pop_front();
+      place(figure);
+    }
   }
   void need(double height) {
-    if (!fits(height) && !at_top()) new_page();
+    while (!fits(height) && !at_top()) new_page();
   }
   void space(double height) {
     if (!at_top()) y_ += height;
@@ -183,26 +190,14 @@ class Flow {
   // --- blocks ---
 
   /// A heading and what it is over. A figure that does not fit this page lets what comes after it
-  /// in the section go first, so that no half page stays empty.
+  /// go first, and stands at the top of the next page, so that no half page stays empty.
   void section(std::span<const Block> blocks) {
-    std::deque<const Figure*> waiting;
-    const auto place_what_fits = [&] {
-      while (!waiting.empty() && fits(4 + height_of(*waiting.front()))) {
-        add(*waiting.front());
-        waiting.pop_front();
-      }
-    };
     for (std::size_t i = 0; i < blocks.size(); ++i) {
       const std::span<const Block> rest = blocks.subspan(i + 1);
       if (const auto* heading = std::get_if<Heading>(&blocks[i])) {
         add(*heading, first_part(rest));
       } else if (const auto* figure = std::get_if<Figure>(&blocks[i])) {
-        waiting.push_back(figure);
-        // One that is smaller goes before one that must wait.
-        if (waiting.size() > 1 && fits(4 + height_of(*figure))) {
-          waiting.pop_back();
-          add(*figure);
-        }
+        add(*figure);
       } else if (const auto* paragraph = std::get_if<Paragraph>(&blocks[i])) {
         add(*paragraph, paragraph->text.ends_with(':') ? first_part(rest) : 0);
       } else if (const auto* facts = std::get_if<Facts>(&blocks[i])) {
@@ -210,23 +205,15 @@ class Flow {
       } else {
         add(std::get<Table>(blocks[i]));
       }
-      place_what_fits();
     }
-    for (const Figure* figure : waiting) add(*figure);
   }
 
-  /// What must stand on the same page below a heading: a part of whatever may come first.
+  /// What must stand on the same page below a heading: a part of what comes first.
   double first_part(std::span<const Block> rest) const {
-    double least = bottom() - paper::kTop;
-    for (const Block& block : rest) {
-      if (const auto* figure = std::get_if<Figure>(&block)) {
-        least = std::min(least, 4 + height_of(*figure));
-        continue;
-      }
-      const auto* table = std::get_if<Table>(&block);
-      return std::min(least, table == nullptr ? 36 : 3 + least_part(lay_out(*table)));
-    }
-    return rest.empty() ? 0 : least;
+    if (rest.empty()) return 0;
+    if (const auto* figure = std::get_if<Figure>(&rest.front())) return 4 + height_of(*figure);
+    const auto* table = std::get_if<Table>(&rest.front());
+    return table == nullptr ? 36 : 3 + least_part(lay_out(*table));
   }
 
   void add(const Heading& heading, double part_below) {
@@ -379,7 +366,7 @@ class Flow {
       const double together =
           begins && table.group[i] <= room ? table.group[i] : table.rows[i].height;
       if (!fits(together) && together <= room) {
-        new_page();
+        need(table.header.height + together);
         draw_head();
       }
       draw_row(table.rows[i], table.widths);
@@ -388,8 +375,10 @@ class Flow {
     y_ += 9;
   }
 
-  static double scale_of(const Figure& figure) {
-    return std::min(kPointsPerPixel, paper::kTextWidth / figure.width);
+  double scale_of(const Figure& figure) const {
+    constexpr double kRoomForCaption = 60;
+    return std::min({kPointsPerPixel, paper::kTextWidth / figure.width,
+                     (bottom() - paper::kTop - kRoomForCaption) / figure.height});
   }
   SharedLayout caption_of(const Figure& figure) const {
     return set(figure.caption, {.size = kCaptionSize, .width = paper::kTextWidth});
@@ -399,9 +388,16 @@ class Flow {
   }
 
   void add(const Figure& figure) {
+    if (waiting_.empty() && (at_top() || fits(4 + height_of(figure)))) {
+      place(figure);
+    } else {
+      waiting_.push_back(&figure);
+    }
+  }
+
+  void place(const Figure& figure) {
     const double scale = scale_of(figure);
     space(4);
-    need(height_of(figure));
     const double top = y_;
     draw([top, scale, draw_figure = figure.draw, typeface = &typeface_](cairo_t* cairo) {
       cairo_save(cairo);
@@ -435,6 +431,7 @@ class Flow {
   const Document& document_;
   const Typeface& typeface_;
   FlowedDocument result_;
+  std::deque<const Figure*> waiting_;
   double y_ = paper::kTop;
 };
 

@@ -38,11 +38,13 @@ Result<ExitCode> run_scalar(const CalibrateOptions& options) {
   if (options.files.samples.empty() || options.files.config.empty()) {
     return fail(ErrorCode::input, "calibrate --scalar needs --samples and --config");
   }
+  const auto style = certificate_style(options.certificate);
+  if (!style) return fail(style.error());
   ScalarFiles files = options.scalar_files;
   files.samples = options.files.samples;
   files.config = options.files.config;
   files.skip_bad_rows = options.files.skip_bad_rows;
-  const auto outcome = calibrate_scalar_files(files, options.out, options.seed);
+  const auto outcome = calibrate_scalar_files(files, *style, options.out, options.seed);
   if (!outcome) return fail(outcome.error());
   std::cout << outcome->summary;
   return outcome->exit_code;
@@ -102,9 +104,7 @@ void add_calibrate(CLI::App& program, Invocation& invocation) {
           ->needs(samples)
           ->needs(config)
           ->excludes(static_record)
-          ->excludes(effects)
-          ->excludes(sub->get_option("--lab"))
-          ->excludes(sub->get_option("--language"));
+          ->excludes(effects);
   sub->add_option("--columns", options->scalar_files.columns,
                   "With --scalar: which column is which axis, as in x=ax_raw,y=ay_raw,z=az_raw "
                   "(default x=ux_V,y=uy_V,z=uz_V)")

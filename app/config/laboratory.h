@@ -36,7 +36,7 @@ inline constexpr const char* kPerformanceLocations[] = {
 struct Laboratory {
   Address laboratory;
   std::string accreditation;  ///< number of the laboratory's accreditation
-  std::string location = "laboratory";
+  std::string location;
   std::string number;  ///< of the certificate in the laboratory's own books
   Address customer;
   std::string order;           ///< the customer's order

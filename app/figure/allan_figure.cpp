@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "app/figure/plot.h"
 #include "app/figure/svg_canvas.h"
@@ -48,7 +49,98 @@ void append(std::vector<double>& all, const std::vector<double>& some) {
   all.insert(all.end(), some.begin(), some.end());
 }
 
+/// Allan variance of a Gauss-Markov process of variance 1 (IEEE Std 952, annex C); x = τ/T_c.
+double markov_variance(double x) {
+  if (x < 1e-3) return x / 3;
+  return 2 / x * (1 - (3 - 4 * std::exp(-x) + std::exp(-2 * x)) / (2 * x));
+}
+
+/// Where the name of a curve stands: at the end at which it is higher, for its middle lies among
+/// the others.
+std::size_t place_of_name(const std::vector<double>& curve) {
+  return curve.front() >= curve.back() ? 0 : curve.size() - 1;
+}
+
 }  // namespace
+
+std::vector<AllanTerm> allan_terms(const NoiseModel& noise) {
+  const auto terms = reported_terms(noise);
+  const auto deviation = [](std::size_t term, double tau) {
+    switch (term) {
+      case kTermQ:
+        return std::sqrt(3.0) / tau;
+      case kTermN:
+        return 1 / std::sqrt(tau);
+      case kTermB:
+        return std::sqrt(2 * std::numbers::ln2 / std::numbers::pi);
+      case kTermK:
+        return std::sqrt(tau / 3);
+      default:
+        return tau / std::numbers::sqrt2;
+    }
+  };
+  std::vector<AllanTerm> curves;
+  for (std::size_t term = 0; term < kTermCount; ++term) {
+    if (!terms[term].present) continue;
+    curves.push_back({kTermName[term], {}});
+    for (const double tau : noise.oadev.tau_s) {
+      curves.back().value.push_back(terms[term].value * deviation(term, tau));
+    }
+  }
+  for (const MarkovTerm& markov : noise.record.markov) {
+    curves.push_back({"M", {}});
+    for (const double tau : noise.oadev.tau_s) {
+      curves.back().value.push_back(markov.sigma * std::sqrt(markov_variance(tau / markov.tau_s)));
+    }
+  }
+  return curves;
+}
+
+void draw_allan_panels(Canvas& canvas, Point top_left, double width, double height,
+                       const std::vector<AllanSeries>& series, const AllanLabels& labels) {
+  if (series.empty()) return;
+  constexpr double kGap = 30, kTop = 22, kRight = 12, kNameSize = 10;
+  std::vector<double> taus, values;
+  for (const AllanSeries& s : series) {
+    append(taus, s.noise->oadev.tau_s);
+    append(values, s.noise->oadev.value);
+    append(values, s.noise->oadev.lower);
+    append(values, drawable_upper(s.noise->oadev));
+  }
+  PlotAxis x = decades(labels.tau, taus), y = decades(labels.deviation, values);
+  const auto count = static_cast<double>(series.size());
+  const double panel = (width - kMarginLeft - kRight - (count - 1) * kGap) / count;
+  double left = top_left.x + kMarginLeft;
+  for (const AllanSeries& s : series) {
+    const DeviationCurve& curve = s.noise->oadev;
+    Plot plot(canvas, {left, top_left.y + kTop}, panel, height - kTop - kMarginBottom, x, y);
+    plot.draw_frame(s.label);
+    for (const AllanTerm& term : allan_terms(*s.noise)) {
+      plot.line(curve.tau_s, term.value, {palette::kBlack, 0.7, {4, 2.5}});
+      const std::size_t k = place_of_name(term.value);
+      const Point at = plot.at(curve.tau_s[k], std::clamp(term.value[k], y.min, y.max));
+      const bool first = k == 0;
+      // Above its curve, to the right of one that falls; within the frame.
+      const double baseline = std::max(at.y - 4, top_left.y + kTop + kNameSize + 1);
+      canvas.text({at.x + (first ? 9 : -3), baseline}, term.name,
+                  {kNameSize, first ? Anchor::start : Anchor::end, 0, true});
+    }
+    if (s.noise->fitted.size() == curve.tau_s.size()) {
+      plot.line(curve.tau_s, s.noise->fitted, {palette::kOrange, 1.6, {}});
+    }
+    if (curve.lower.size() == curve.tau_s.size() && curve.upper.size() == curve.tau_s.size()) {
+      const std::vector<double> upper = drawable_upper(curve);
+      for (std::size_t k = 0; k < upper.size(); ++k) {
+        plot.line({curve.tau_s[k], curve.tau_s[k]}, {curve.lower[k], upper[k]},
+                  {palette::kBlue, 1, {}});
+      }
+    }
+    plot.points(curve.tau_s, curve.value, 2.2, palette::kBlue);
+    y.label.clear();
+    y.tick_labels = false;
+    left += panel + kGap;
+  }
+}
 
 void draw_allan(Canvas& canvas, Point top_left, double width, double height,
                 const std::vector<AllanSeries>& series, const AllanLabels& labels) {

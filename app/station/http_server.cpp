@@ -42,8 +42,19 @@ HttpRequest request_of(const httplib::Request& from) {
 void send(HttpReply reply, httplib::Response& to) {
   to.status = reply.status;
   for (const auto& [name, value] : reply.headers) to.set_header(name, value);
+  if (!reply.stream && reply.body.empty()) {
+    to.set_content("", reply.type);
+    return;
+  }
   if (!reply.stream) {
-    to.set_content(std::move(reply.body), reply.type);
+    // What the library is given as text it compresses with Brotli at its slowest: seconds of the
+    // machine that runs the rig for every look at a certificate, and no gain on a local network.
+    const std::size_t size = reply.body.size();
+    to.set_content_provider(size, reply.type,
+                            [body = std::move(reply.body)](std::size_t offset, std::size_t length,
+                                                           httplib::DataSink& sink) {
+                              return sink.write(body.data() + offset, length);
+                            });
     return;
   }
   to.set_header("Cache-Control", "no-store");

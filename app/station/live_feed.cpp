@@ -74,6 +74,12 @@ Json range_json(const AngleRange& range) {
   return Json::array({range.start_deg, range.stop_deg, range.step_deg});
 }
 
+/// Three a pose: what needs attention would drown in them.
+bool is_routine(const std::string& text) {
+  return text.starts_with("moving: ") || text.starts_with("settling: ") ||
+         text.starts_with("sampling: ");
+}
+
 }  // namespace
 
 LiveFeed::LiveFeed(const History& history) : history_(history) {
@@ -126,6 +132,11 @@ Json LiveFeed::status() const {
 bool LiveFeed::session_running() const {
   const std::lock_guard lock(mutex_);
   return running_;
+}
+
+bool LiveFeed::at_rest() const {
+  const std::lock_guard lock(mutex_);
+  return phase_ != "running" && phase_ != "calculating";
 }
 
 void LiveFeed::follow(const std::stop_token& stop) {
@@ -242,6 +253,7 @@ void LiveFeed::read_stored(storage::RunId run) {
 }
 
 void LiveFeed::add_event(double t_s, const std::string& kind, const std::string& text, Json json) {
+  if (kind == "state" && is_routine(text)) return;
   LiveEvent event{std::isfinite(t_s) ? std::llround(1e3 * t_s) : 0, kind + " " + text,
                   std::move(json)};
   // Of the same instant they stand in the order in which they were told.
@@ -366,6 +378,7 @@ void LiveFeed::look_at_database() {
 
 void LiveFeed::publish(Json message) {
   message["schema"] = "plumbline.live/1";
+  const std::string phase = message.at("phase");
   message["run"] = run_json_;
   message["estimate"] = estimate_;
   message["noise"] = noise_;
@@ -385,6 +398,7 @@ void LiveFeed::publish(Json message) {
   made->text = std::move(text);
   const std::lock_guard lock(mutex_);
   newest_ = std::move(made);
+  phase_ = phase;
   changed_.notify_all();
 }
 

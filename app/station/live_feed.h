@@ -65,11 +65,14 @@ class LiveFeed {
   /// {"poses_version": …, "poses": [[step, delta, h, rx, ry, rz, settle_s, temp_C]…]} with the
   /// running residuals in m/s², null while there is no estimate; verification poses left out.
   std::string poses() const;
-  /// Of this run, oldest first: {"events": [{t_s, utc, kind, text}…]}.
+  /// Of this run, oldest first: {"events": [{t_s, utc, kind, text}…]}; without going from pose to
+  /// pose.
   std::string events() const;
   /// The newest STATUS; null when no session is on.
   Json status() const;
   bool session_running() const;
+  /// Whether nothing goes on: neither a session, nor the calculation of what it measured.
+  bool at_rest() const;
 
  private:
   void follow(const std::stop_token& stop);
@@ -96,6 +99,7 @@ class LiveFeed {
   std::vector<LiveEvent> events_;  ///< in the order in which they happened
   Json status_;
   bool running_ = false;
+  std::string phase_;
 
   // Of the thread alone.
   storage::RunId run_ = 0;

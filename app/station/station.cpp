@@ -37,8 +37,8 @@ namespace {
 constexpr milliseconds kHeartbeat{3000};
 /// How long an open stream may delay the end of the server.
 constexpr milliseconds kTurn{200};
-/// A viewer that joined late does not keep a finished run waiting.
-constexpr milliseconds kFarewell{2500};
+/// A run that is over waits so long at most for its viewers to hear of it.
+constexpr milliseconds kFarewell{5000};
 constexpr std::size_t kMostRuns = 200;
 
 struct Asset {
@@ -406,8 +406,12 @@ Result<std::unique_ptr<Station>> Station::start(const StationOptions& options) {
 const ListenAddress& Station::address() const { return parts_->server->address(); }
 
 void Station::let_viewers_see_the_end() const {
-  if (parts_->viewers->load() == 0) return;
-  std::this_thread::sleep_for(kFarewell);
+  const auto anybody = [&] { return parts_->viewers->load() > 0; };
+  for (auto left = kFarewell; left.count() > 0 && anybody() && !parts_->feed.at_rest();
+       left -= kTurn) {
+    std::this_thread::sleep_for(kTurn);
+  }
+  if (anybody()) std::this_thread::sleep_for(5 * kTurn);  // the last message is on its way
 }
 
 }  // namespace plumbline::app

@@ -122,10 +122,11 @@ void check_html(const Files& files, const ReadDcc& dcc, VerifyReport& report) {
                 fmt::format("{} and {}", words->empty() ? "none" : words->front(), dcc.id));
 }
 
-/// The calibrated parameters of result.json in the order of the XML: three rows and the offsets.
+/// Calibrated parameters of result.json, in the unit and the order of one list of the XML.
 struct Parameters {
   std::vector<double> values;
   std::vector<double> u;
+  double printed = 1e3;  ///< the HTML prints them times this
 };
 
 void compare_parameters(const Parameters& stated, const XmlList* list, const std::string& name,
@@ -141,31 +142,64 @@ void compare_parameters(const Parameters& stated, const XmlList* list, const std
                 "the numbers differ");
   if (words == nullptr) return;
   for (std::size_t k = 0; k < list->values.size() && k < list->expanded.size(); ++k) {
-    const RoundedResult printed = round_result(1e3 * list->values[k], 1e3 * list->expanded[k]);
+    const RoundedResult printed =
+        round_result(stated.printed * list->values[k], stated.printed * list->expanded[k]);
     const bool found = std::find(words->begin(), words->end(), printed.value) != words->end();
     if (!found) report.bad(fmt::format("HTML prints {} of {}: not found", printed.value, name));
   }
 }
 
+void check_twelve(const Json& fit, const ReadDcc& dcc, const std::vector<std::string>* words,
+                  VerifyReport& report) {
+  Parameters offsets;
+  for (const char* axis : kAxisName) {
+    const Json& row = fit.at(axis);
+    compare_parameters({row.at("K_V_per_g").get<std::vector<double>>(),
+                        row.at("u_K_V_per_g").get<std::vector<double>>()},
+                       dcc.list(fmt::format("K_{}x", axis), dsi::kVoltPerG),
+                       fmt::format("K_{0}x, K_{0}y, K_{0}z", axis), words, report);
+    offsets.values.push_back(row.at("U0_V").get<double>());
+    offsets.u.push_back(row.at("u_U0_V").get<double>());
+  }
+  compare_parameters(offsets, dcc.list("U_x0", dsi::kVolt), "U_x0, U_y0, U_z0", words, report);
+}
+
+/// Of a calibration without angles.
+void check_nine(const Json& scalar, const ReadDcc& dcc, const std::vector<std::string>* words,
+                VerifyReport& report) {
+  const Json& fit = scalar.contains("with_effects") ? scalar.at("with_effects") : scalar;
+  const ReadingUnits units = reading_units(scalar.at("reading_unit").get<std::string>());
+  const auto times = [](std::vector<double> values, double factor) {
+    for (double& value : values) value *= factor;
+    return values;
+  };
+  const auto compare = [&](const char* name, double factor, const std::string& unit) {
+    compare_parameters(
+        {times(fit.at(name).get<std::vector<double>>(), factor),
+         times(fit.at(fmt::format("u_{}", name)).get<std::vector<double>>(), factor), 1 / factor},
+        dcc.list(fmt::format("{}_x", name), unit), name, words, report);
+  };
+  compare("bias", units.factor, units.bias);
+  compare("scale", 1 / units.factor, units.scale);
+  Parameters angles;
+  for (const char* name : {"yz", "zy", "zx"}) {
+    angles.values.push_back(fit.at("nonorthogonality_rad").at(name).get<double>());
+    angles.u.push_back(fit.at("u_nonorthogonality_rad").at(name).get<double>());
+  }
+  compare_parameters(angles, dcc.list("angle_yz", "\\radian"), "nonorthogonality", words, report);
+}
+
 void check_numbers(const Files& files, const ReadDcc& dcc, VerifyReport& report) {
   std::optional<std::vector<std::string>> words;
   if (const auto parsed = html_words(*files.html, "certificate.html")) words = *parsed;
+  const std::vector<std::string>* const printed = words ? &*words : nullptr;
   try {
     const Json json = Json::parse(*files.result);
-    const Json& fit = json.at("final").at("batch_ls");
-    Parameters offsets;
-    for (const char* axis : kAxisName) {
-      const Json& row = fit.at(axis);
-      compare_parameters({row.at("K_V_per_g").get<std::vector<double>>(),
-                          row.at("u_K_V_per_g").get<std::vector<double>>()},
-                         dcc.list(fmt::format("K_{}x", axis), dsi::kVoltPerG),
-                         fmt::format("K_{0}x, K_{0}y, K_{0}z", axis), words ? &*words : nullptr,
-                         report);
-      offsets.values.push_back(row.at("U0_V").get<double>());
-      offsets.u.push_back(row.at("u_U0_V").get<double>());
+    if (json.contains("scalar")) {
+      check_nine(json.at("scalar"), dcc, printed, report);
+    } else {
+      check_twelve(json.at("final").at("batch_ls"), dcc, printed, report);
     }
-    compare_parameters(offsets, dcc.list("U_x0", dsi::kVolt), "U_x0, U_y0, U_z0",
-                       words ? &*words : nullptr, report);
   } catch (const std::exception& error) {
     report.bad(fmt::format("result.json: not usable: {}", error.what()));
   }

@@ -81,19 +81,18 @@ struct Baseline {
   const EnlargedParameters& model;
   std::vector<HeadGeometry> head;    ///< with the model's own effects
   std::vector<Eigen::Vector3d> a_g;  ///< seen through that geometry
+
+  TermInput input(std::size_t axis, Eigen::Index visit) const {
+    return term_input(log, model.twelve[axis], axis, a_g, static_cast<std::size_t>(visit));
+  }
 };
 
 // Term of a sensor effect on its axis, V, n rows.
 void set_sensor_response(const Baseline& base, const ActiveEffect& active,
                          Eigen::Ref<Eigen::VectorXd> change) {
-  const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
-  const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
   for (Eigen::Index k = 0; k < change.size(); ++k) {
-    const auto visit = static_cast<std::size_t>(k);
-    const double response_V = twelve.head<3>().dot(base.a_g[visit]);
-    const TermInput input{
-        base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
-    change(k) = K_ii * active.effect->term_g(input, active.p.data());
+    const TermInput input = base.input(active.axis, k);
+    change(k) = input.K_V_per_g * active.effect->term_g(input, active.p.data());
   }
 }
 
@@ -143,15 +142,9 @@ std::size_t group_of(const Candidate& candidate) {
 // The course of the dwells that a sensor effect makes, V, n rows a contrast.
 void set_dwell_response(const Baseline& base, const ActiveEffect& active,
                         Eigen::Ref<Eigen::VectorXd> change) {
-  const Eigen::Vector4d& twelve = base.model.twelve[active.axis];
-  const double K_ii = twelve(static_cast<Eigen::Index>(active.axis));
   const auto n = static_cast<Eigen::Index>(base.a_g.size());
   for (Eigen::Index k = 0; k < n; ++k) {
-    const auto visit = static_cast<std::size_t>(k);
-    const double response_V = twelve.head<3>().dot(base.a_g[visit]);
-    const TermInput input{
-        base.log, visit, active.axis, base.a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
-    const Eigen::VectorXd contrasts = dwell_contrasts_V(input, active);
+    const Eigen::VectorXd contrasts = dwell_contrasts_V(base.input(active.axis, k), active);
     for (Eigen::Index d = 0; d < contrasts.size(); ++d) change(d * n + k) = contrasts(d);
   }
 }
@@ -191,7 +184,7 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
     group.means.resize(g == kHead ? mean_rows(log) : n, columns);
     group.first_dwell_row = mean_rows(log) + axis * log.dwell_contrasts() * n;
     group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * n : 0, columns);
-    constexpr Eigen::Index kColumns = 64;
+    constexpr Eigen::Index kColumns = 192;
     for (Eigen::Index first = 0; first < columns; first += kColumns)
       blocks.push_back({g, first, std::min(kColumns, columns - first)});
   }
@@ -230,7 +223,7 @@ CandidateGains::CandidateGains(const CandidateResponses& responses, const Enlarg
   parallel_for(taken.size(),
                [&](std::size_t g) { taken[g] = responses.groups[g].products(model_basis_); });
   transform_.resize(responses.place.size());
-  for (std::size_t c = 0; c < transform_.size(); ++c) {
+  parallel_for(transform_.size(), [&](std::size_t c) {
     const auto& [g, first, count] = responses.place[c];
     const auto means = responses.groups[g].means.middleCols(first, count);
     const auto dwells = responses.groups[g].dwells.middleCols(first, count);
@@ -251,7 +244,7 @@ CandidateGains::CandidateGains(const CandidateResponses& responses, const Enlarg
       transform.row(transform.rows() - 1) = direction / std::sqrt(square);
     }
     transform_[c] = std::move(transform);
-  }
+  });
 }
 
 Eigen::MatrixXd CandidateGains::project(const Eigen::MatrixXd& whitened) const {

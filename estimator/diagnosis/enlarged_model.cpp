@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -100,6 +101,13 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
   return a_g;
 }
 
+TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
+                     const std::vector<Eigen::Vector3d>& a_g, std::size_t visit) {
+  const double K_ii = twelve(static_cast<Eigen::Index>(axis));
+  const double response_V = twelve.head<3>().dot(a_g[visit]);
+  return {log, visit, axis, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+}
+
 namespace {
 
 using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
@@ -108,11 +116,8 @@ using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
 template <class Work>
 void for_sensor_terms(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
                       const Forces& a_g, const Work& work) {
-  const Eigen::Vector4d& twelve = parameters.twelve[axis];
-  const double K_ii = twelve(static_cast<Eigen::Index>(axis));
   for (std::size_t k = 0; k < log.visits.size(); ++k) {
-    const double response_V = twelve.head<3>().dot(a_g[k]);
-    const TermInput input{log, k, axis, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
+    const TermInput input = term_input(log, parameters.twelve[axis], axis, a_g, k);
     for (const ActiveEffect& active : parameters.effects) {
       if (active.effect->subject() == Subject::sensor && active.axis == axis) work(input, active);
     }
@@ -146,6 +151,21 @@ Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& 
   return dwell_V;
 }
 
+PerAxis<Eigen::VectorXd> means_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                 const Forces& a_g) {
+  PerAxis<Eigen::VectorXd> mean_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) mean_V[i] = means_of_axis_V(log, parameters, i, a_g);
+  return mean_V;
+}
+
+PerAxis<Eigen::MatrixXd> dwells_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                  const Forces& a_g) {
+  PerAxis<Eigen::MatrixXd> dwell_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    dwell_V[i] = dwells_of_axis_V(log, parameters, i, a_g);
+  return dwell_V;
+}
+
 }  // namespace
 
 bool has_effect_within_dwell(const EnlargedParameters& parameters) {
@@ -155,10 +175,7 @@ bool has_effect_within_dwell(const EnlargedParameters& parameters) {
 
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
                                          const EnlargedParameters& parameters) {
-  const Forces a_g = specific_forces_g(log, parameters);
-  PerAxis<Eigen::VectorXd> mean_V;
-  for (std::size_t i = 0; i < kAxisCount; ++i) mean_V[i] = means_of_axis_V(log, parameters, i, a_g);
-  return mean_V;
+  return means_V(log, parameters, specific_forces_g(log, parameters));
 }
 
 Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active) {
@@ -173,11 +190,7 @@ Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& ac
 
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
                                           const EnlargedParameters& parameters) {
-  const Forces a_g = specific_forces_g(log, parameters);
-  PerAxis<Eigen::MatrixXd> dwell_V;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    dwell_V[i] = dwells_of_axis_V(log, parameters, i, a_g);
-  return dwell_V;
+  return dwells_V(log, parameters, specific_forces_g(log, parameters));
 }
 
 Observations observe(const MeasurementSet& set, const VisitLog& log) {
@@ -204,14 +217,21 @@ Eigen::Index stacked_rows(const VisitLog& log) {
 
 namespace {
 
-// Time constants, widths and the like keep their sign.
-bool keeps_signs(const EnlargedParameters& trial, const EnlargedParameters& now) {
+// Time constants, widths and the like keep their sign, and sensitivities about their size: no
+// effect takes their place.
+bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
+  constexpr double kLargestChange = 3;  // as a ratio
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto own = static_cast<Eigen::Index>(i);
+    const double ratio = trial.twelve[i](own) / start.twelve[i](own);
+    if (!(ratio > 1 / kLargestChange && ratio < kLargestChange)) return false;
+  }
   for (std::size_t e = 0; e < trial.effects.size(); ++e) {
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
     for (std::size_t k = 0; k < infos.size(); ++k)
       if (active.free[k] && infos[k].role == ParameterRole::shape &&
-          !(active.p[k] * now.effects[e].p[k] > 0))
+          !(active.p[k] * start.effects[e].p[k] > 0))
         return false;
   }
   return true;
@@ -253,7 +273,8 @@ std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters)
 }  // namespace
 
 Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters) {
-  return stacked(predict_means_V(log, parameters), predict_dwells_V(log, parameters));
+  const Forces a_g = specific_forces_g(log, parameters);
+  return stacked(means_V(log, parameters, a_g), dwells_V(log, parameters, a_g));
 }
 
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {
@@ -294,8 +315,7 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
   lower[axis] = Eigen::LLT<Eigen::MatrixXd>(covariance_V2).matrixL();
-  inverse[axis].setIdentity(lower[axis].rows(), lower[axis].cols());
-  lower[axis].triangularView<Eigen::Lower>().solveInPlace(inverse[axis]);
+  inverse[axis] = inverse_of_triangle(lower[axis]);
 }
 
 void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const {
@@ -303,10 +323,13 @@ void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd>
   Eigen::Index first = 0;
   while (first < means_V.rows() && (means_V.row(first).array() == 0).all()) ++first;
   const Eigen::Index rest = means_V.rows() - first;
-  means_V.bottomRows(rest) =
-      (inverse[axis].bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() *
-       means_V.bottomRows(rest))
-          .eval();
+  // So do the columns of a Jacobian that belong to other axes.
+  std::vector<Eigen::Index> seen;
+  for (Eigen::Index j = 0; j < means_V.cols(); ++j)
+    if ((means_V.col(j).array() != 0).any()) seen.push_back(j);
+  const Eigen::MatrixXd concerned = means_V(Eigen::lastN(rest), seen);
+  means_V(Eigen::lastN(rest), seen) =
+      inverse[axis].bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() * concerned;
 }
 
 Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
@@ -325,6 +348,7 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start) {
   constexpr int kMaxIterations = 20;
+  constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
   const Eigen::Index rows =
       has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
   const Eigen::VectorXd measured = stacked(observed.mean_V, observed.dwell_V);
@@ -343,7 +367,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
                                                          norms.cwiseInverse().asDiagonal());
     const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
-    fit.determined = diagonal.minCoeff() > 1e-7 * diagonal.maxCoeff();
+    fit.determined = diagonal.minCoeff() > kDetermined * diagonal.maxCoeff();
     if (!fit.determined) return fit;
 
     const Eigen::VectorXd step =
@@ -353,7 +377,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
       EnlargedParameters trial = fit.parameters;
       trial.set_free_values(fit.parameters.free_values() + share * step);
-      if (!keeps_signs(trial, fit.parameters)) continue;
+      if (!makes_sense(trial, start)) continue;
       const Eigen::VectorXd residual = whitened_residual(trial);
       const double chi2 = residual.squaredNorm();
       if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;

@@ -42,6 +42,11 @@ std::vector<HeadGeometry> head_geometries(const VisitLog& log,
 std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
                                                const EnlargedParameters& parameters);
 
+/// What a term of an axis may depend on at one visit, `twelve` being the axis's parameters and
+/// `a_g` the specific forces of all visits, which must live as long.
+TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
+                     const std::vector<Eigen::Vector3d>& a_g, std::size_t visit);
+
 /// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
 

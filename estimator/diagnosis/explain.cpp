@@ -180,10 +180,11 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   search_options.seed = options.seed;
   const CandidateList candidates = all_candidates(log, options.own_effects);
   SearchResult found = search_effects(search, candidates, search_options);
-  if (found.evidence.empty()) {
+  const auto without_effects = [&]() -> std::optional<WorstError> {
     result.diagnosis.not_found = detection_limits(search, candidates, found);
     return std::nullopt;
-  }
+  };
+  if (found.evidence.empty()) return without_effects();
 
   std::vector<double> gains;
   const std::size_t before_dropping = found.evidence.size();
@@ -193,10 +194,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   drop_what_does_not_carry(search, heldout, partitions, result.floor_pose_rms_mps2, found, gains);
   if (found.evidence.size() != before_dropping)
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
-  if (found.evidence.empty()) {
-    result.diagnosis.not_found = detection_limits(search, candidates, found);
-    return std::nullopt;
-  }
+  if (found.evidence.empty()) return without_effects();
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);

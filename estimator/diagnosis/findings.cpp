@@ -8,6 +8,7 @@
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/separation.h"
 #include "estimator/effects/smooth_term.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
@@ -53,16 +54,32 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
   return reported;
 }
 
-/// What else effect `index` could be, and what would tell.
-void add_rivals(const SearchInput& input, const CandidateList& list, const SearchResult& search,
-                const HeadReach& reach, std::size_t index, FoundEffect& entry) {
-  const std::vector<Alternative> rivals = find_alternatives(input, list, search, index);
-  for (const Alternative& rival : rivals) {
+/// What else an effect could be, and what would tell.
+struct Rivals {
+  std::vector<Alternative> alternatives;
+  Separation separation;
+};
+
+/// Of each effect in `search` that has any.
+std::vector<Rivals> all_rivals(const SearchInput& input, const CandidateList& list,
+                               const SearchResult& search, const HeadReach& reach) {
+  std::vector<Rivals> rivals(search.evidence.size());
+  parallel_for(rivals.size(), [&](std::size_t e) {
+    const Effect& effect = *search.evidence[e].candidate.effect;
+    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr || effect.certain(input.log)) return;
+    rivals[e].alternatives = find_alternatives(input, list, search, e);
+    rivals[e].separation = separate(input, search, e, rivals[e].alternatives, reach);
+  });
+  return rivals;
+}
+
+void add_rivals(const Rivals& rivals, FoundEffect& entry) {
+  for (const Alternative& rival : rivals.alternatives) {
     auto& names = entry.alternatives;
     if (std::find(names.begin(), names.end(), rival.name) == names.end())
       names.push_back(rival.name);
   }
-  const Separation separation = separate(input, search, index, rivals, reach);
+  const Separation& separation = rivals.separation;
   if (separation.words.empty() || entry.separate_by == separation.words) return;
   entry.separate_by += (entry.separate_by.empty() ? "" : "; ") + separation.words;
   // Further axes of the same effect rarely need other poses: the longest plan serves.
@@ -153,6 +170,7 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
   Diagnosis diagnosis;
   auto [effects, unlisted] = report(input.log, search.fit);
   diagnosis.not_found = detection_limits(input, list, search);
+  const std::vector<Rivals> rivals = all_rivals(input, list, search, reach);
   std::size_t next_unlisted = 0;
   for (std::size_t e = 0; e < search.evidence.size(); ++e) {
     const Effect& effect = *search.evidence[e].candidate.effect;
@@ -163,7 +181,7 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
     for (FoundEffect& entry : effects) {
       if (entry.id != effect.id()) continue;
       entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
-      if (!effect.certain(input.log)) add_rivals(input, list, search, reach, e, entry);
+      add_rivals(rivals[e], entry);
     }
   }
   diagnosis.effects = std::move(effects);

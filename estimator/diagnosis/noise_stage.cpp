@@ -1,7 +1,9 @@
 #include "estimator/diagnosis/noise_stage.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/fit/rounding.h"
 #include "estimator/parallel_for.h"
@@ -84,7 +86,8 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       stage.noise[i] = *before.known[i];
     } else {
       Eigen::MatrixXd columns(n, jacobian.cols() + beside.cols());
-      columns << jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n), beside;
+      columns.leftCols(jacobian.cols()) = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
+      if (beside.cols() > 0) columns.rightCols(beside.cols()) = beside;
       const Eigen::MatrixXd design = independent_columns(columns);
       const NoisePool pool(input.processes,
                            free.coarse || input.log.coarser_lattice[i]
@@ -149,6 +152,25 @@ Eigen::MatrixXd slow_functions(const VisitLog& log) {
   if (!is_slow_in_order(height)) return functions;
   for (const double power : {2.0, 3.0})
     add([power](const Visit& visit) { return std::pow(std::sin(visit.h_rad), power); });
+  return functions;
+}
+
+Eigen::MatrixXd any_course_of_time(const VisitLog& log) {
+  const auto n = static_cast<Eigen::Index>(log.visits.size());
+  const Eigen::Index waves = std::min<Eigen::Index>(16, n / 12);
+  const Eigen::MatrixXd slow = slow_functions(log);
+  Eigen::MatrixXd functions(n, slow.cols() + waves);
+  functions.leftCols(slow.cols()) = slow;
+  for (Eigen::Index w = 0; w < waves; ++w) {
+    auto column = functions.col(slow.cols() + w);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double t_s = log.visits[static_cast<std::size_t>(k)].t_mean_s - log.first_s();
+      column(k) = std::cos(std::numbers::pi * static_cast<double>(w + 1) * t_s /
+                           (log.last_s() - log.first_s()));
+    }
+    column.array() -= column.mean();
+    column.normalize();
+  }
   return functions;
 }
 

@@ -41,4 +41,8 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters, con
 /// recorded; n × any number, each centred and of unit length.
 Eigen::MatrixXd slow_functions(const VisitLog& log);
 
+/// The same, and cosines of the time up to 16 half waves in the run (fewer where the visits are
+/// few): whatever happened once and took a while is in their span.
+Eigen::MatrixXd any_course_of_time(const VisitLog& log);
+
 }  // namespace plumbline

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 
 namespace plumbline {
@@ -88,8 +89,10 @@ Eigen::MatrixXd structure_functions(const Eigen::MatrixXd& a, const Eigen::Matri
 
 /// Degrees of freedom from which the noise along the structure functions is known: Satterthwaite's
 /// 2/relvar of tr(S·Σ)/q under the uncertainty of the estimated powers, S what the functions take.
+/// P is the projector of the columns that the noise was estimated beside.
 double noise_degrees_of_freedom(const NoisePool& pool, const PooledNoise& noise,
-                                const Eigen::MatrixXd& taken, double functions) {
+                                const Eigen::MatrixXd& P, const Eigen::MatrixXd& taken,
+                                double functions) {
   // A slow process estimated at zero is uncertain all the same.
   const std::vector<Eigen::Index> free = {kTermN, kTermB, kTermK};
   Eigen::VectorXd slope(static_cast<Eigen::Index>(free.size()));
@@ -97,11 +100,7 @@ double noise_degrees_of_freedom(const NoisePool& pool, const PooledNoise& noise,
     slope(static_cast<Eigen::Index>(i)) =
         taken.cwiseProduct(pool.processes().unit[static_cast<std::size_t>(free[i])]).sum() /
         functions;
-  const Eigen::MatrixXd information = noise.information(free, free);
-  const Eigen::VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
-  const Eigen::VectorXd right = scale.cwiseProduct(slope);
-  const double variance = right.dot(scaled.ldlt().solve(right));
+  const double variance = propagated_variance(pool.information_of(noise.power, P, free), slope);
   return variance > 0 ? 2 / variance : 1e9;
 }
 
@@ -118,25 +117,28 @@ double merged(double first, double second) {
 struct Judgement {
   PooledNoise noise;
   double p_structure = 1;
+  double chi2 = 0;    ///< of the model alone
   Eigen::MatrixXd P;  ///< projector of the columns that the noise was estimated beside
 };
 
+/// `beside`: how many columns of [design, functions] the noise was estimated beside.
 Judgement judge(const NoisePool& pool, PooledNoise noise, const Eigen::VectorXd& y,
                 const Eigen::MatrixXd& design, const Eigen::MatrixXd& functions,
-                Eigen::Index columns) {
+                Eigen::Index beside) {
   Judgement result;
   result.noise = std::move(noise);
   const Eigen::MatrixXd before = make_projector(result.noise.covariance, design).P;
+  result.chi2 = y.dot(before * y);
   // The same with the functions, by the block form of the projector.
   const Eigen::MatrixXd weighted = before * functions;
   const Eigen::LDLT<Eigen::MatrixXd> normal(functions.transpose() * weighted);
   const Eigen::MatrixXd taken = weighted * normal.solve(weighted.transpose());
-  const auto count = static_cast<double>(functions.cols());
+  result.P = beside > design.cols() ? Eigen::MatrixXd(before - taken) : before;
   if (functions.cols() > 0) {
-    const double dof = noise_degrees_of_freedom(pool, result.noise, taken, count);
+    const auto count = static_cast<double>(functions.cols());
+    const double dof = noise_degrees_of_freedom(pool, result.noise, result.P, taken, count);
     result.p_structure = f_tail(y.dot(taken * y) / count, count, dof);
   }
-  result.P = columns > design.cols() ? Eigen::MatrixXd(before - taken) : before;
   return result;
 }
 
@@ -172,30 +174,24 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   full << input.design, functions;
   const bool enough = n >= input.design.cols() + 3 * functions.cols();
   const NoisePool pool(input.processes, noise, input.extra_variance);
-  const auto judged = [&](const PooledNoise& pooled, const Eigen::MatrixXd& beside) {
-    PooledNoise informed = pooled;
-    informed.information = pool.information_of(pooled, beside);
-    return judge(pool, std::move(informed), y, input.design, functions, beside.cols());
-  };
   const PooledNoise plain_noise = pool.pool(y, input.design);
-  const Judgement plain = judged(plain_noise, input.design);
+  Judgement judged = judge(pool, plain_noise, y, input.design, functions, input.design.cols());
   ResidualTestResult result;
-  result.noise = plain.noise;
-  result.p_structure = 1;
-  Eigen::MatrixXd P = plain.P;
   if (enough) {
     // With the noise estimated beside the model alone, structure is partly taken for slow noise;
     // beside the functions, too, slow noise is partly taken for structure. Both count.
-    const Judgement rich = judged(pool.pool(y, full, &plain_noise.power), full);
-    result.p_structure = merged(plain.p_structure, rich.p_structure);
-    if (result.p_structure < kStructureSeen) {
-      result.noise = rich.noise;
-      P = rich.P;
-    }
+    Judgement rich = judge(pool, pool.pool(y, full, &plain_noise.power), y, input.design, functions,
+                           full.cols());
+    result.p_structure = merged(judged.p_structure, rich.p_structure);
+    if (result.p_structure < kStructureSeen) judged = std::move(rich);
   }
-  const Projector before = make_projector(result.noise.covariance, input.design);
-  result.chi2 = y.dot(before.P * y);
+  for (Eigen::Index i = 0; i < judged.noise.power.size(); ++i)
+    if (judged.noise.power(i) > 0) result.present.push_back(i);
+  result.information = pool.information_of(judged.noise.power, judged.P, result.present);
+  result.noise = std::move(judged.noise);
+  result.chi2 = judged.chi2;
   result.dof = static_cast<double>(n - input.design.cols());
+  const Eigen::MatrixXd& P = judged.P;
   const Eigen::VectorXd py = P * y;
 
   // Scatter from pose to pose: the score of an independent variance beside the noise, against its

@@ -5,82 +5,17 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <random>
 #include <utility>
 
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/residual_test.h"
+#include "estimator/diagnosis/screening.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
 
-double log_chi_squared_tail(double x, double dof) {
-  if (!(x > 0)) return 0;
-  if (x < 200) return std::log(std::max(chi_squared_tail(x, dof), 1e-300));
-  // Leading terms of the incomplete gamma function for large x.
-  const double half = 0.5 * dof, y = 0.5 * x;
-  return (half - 1) * std::log(y) - y - std::lgamma(half) + std::log1p((half - 1) / y);
-}
-
 namespace {
-
-// How many independent looks the search amounts to: the best p-value of a search over pure noise
-// is that of the best of so many.
-double effective_looks(const CandidateGains& gains_of, std::size_t candidates, Eigen::Index rows,
-                       const SearchOptions& options) {
-  std::mt19937_64 generator(options.seed);
-  std::normal_distribution<double> normal;
-  Eigen::MatrixXd noise(rows, options.replicates);
-  for (double& value : noise.reshaped()) value = normal(generator);
-  const Eigen::MatrixXd gains = gains_of.of(gains_of.project(noise));
-  Eigen::VectorXd log_none(gains.cols());  // that no candidate does as well in such noise
-  parallel_for(static_cast<std::size_t>(gains.cols()), [&](std::size_t replicate) {
-    const auto r = static_cast<Eigen::Index>(replicate);
-    // Among candidates of equal freedom the largest gain is the least probable.
-    std::map<int, double> largest;
-    for (std::size_t c = 0; c < candidates; ++c) {
-      double& gain = largest[gains_of.dof(c)];
-      gain = std::max(gain, gains(static_cast<Eigen::Index>(c), r));
-    }
-    double best = 0;
-    for (const auto& [dof, gain] : largest)
-      if (dof > 0) best = std::min(best, log_chi_squared_tail(gain, dof));
-    log_none(r) = std::log1p(-std::exp(std::min(best, -1e-12)));
-  });
-  return std::max(1.0, -static_cast<double>(options.replicates) / log_none.sum());
-}
-
-double p_of_search(double log_p_local, double looks) {
-  // Smaller than any double holds is still not zero.
-  return std::max(-std::expm1(-looks * std::exp(log_p_local)), 1e-300);
-}
-
-struct Scored {
-  std::size_t candidate = 0;
-  double log_p = 0;  ///< of its own test
-  double score = 0;  ///< log_p plus the price of a large family and of having no name
-};
-
-// Best hypothesis of each family by the first-order gain, best family first.
-std::vector<Scored> screen(const CandidateList& list, const CandidateGains& gains_of,
-                           const Eigen::VectorXd& gains) {
-  std::vector<Scored> best(list.family_size.size(),
-                           {0, 0, std::numeric_limits<double>::infinity()});
-  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
-    if (gains_of.dof(c) == 0) continue;
-    const std::size_t family = list.candidates[c].family;
-    const double log_p = log_chi_squared_tail(gains(static_cast<Eigen::Index>(c)), gains_of.dof(c));
-    const double score = log_p + std::log(static_cast<double>(list.family_size[family])) +
-                         list.candidates[c].handicap;
-    if (score < best[family].score) best[family] = {c, log_p, score};
-  }
-  std::erase_if(best, [](const Scored& s) { return !std::isfinite(s.score); });
-  std::sort(best.begin(), best.end(),
-            [](const Scored& a, const Scored& b) { return a.score < b.score; });
-  return best;
-}
 
 EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active) {
   model.effects.push_back(active);
@@ -151,6 +86,7 @@ class Search {
   EnlargedFit fit(const EnlargedParameters& parameters) const {
     return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
   }
+  /// The model with one more effect.
   EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const {
     return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening,
                               with_effect(model, active), model.effects.size());
@@ -203,8 +139,7 @@ class Search {
       best = with.parameters;
     }
     if (!adopt(best)) return;
-    chosen_.push_back(candidate);
-    p_values_.push_back(kProven);
+    choose(candidate, kProven);
   }
   EnlargedFit fit_without(const std::vector<std::size_t>& removed) const {
     EnlargedParameters fewer = stage_.fit.parameters;
@@ -246,7 +181,7 @@ class Search {
     // The number of looks hardly changes while the model grows.
     if (looks_ == 0)
       looks_ = effective_looks(gains, list_.candidates.size(), stage_.fit.whitened_residual.size(),
-                               options_);
+                               options_.seed, options_.replicates);
     const auto surest =
         std::min_element(ranked.begin(), ranked.end(),
                          [](const Scored& a, const Scored& b) { return a.log_p < b.log_p; });
@@ -285,8 +220,7 @@ class Search {
     if (winner == nullptr) return replace_overlapping(ranked, gains);
     const double p = p_of_search(winner_log_p, looks_);
     if (p > options_.false_alarm || !adopt(with_winner)) return false;
-    chosen_.push_back(winner->candidate);
-    p_values_.push_back(p);
+    choose(winner->candidate, p);
     return true;
   }
 
@@ -294,9 +228,29 @@ class Search {
   /// hides in it. So the noise is estimated once more, beside all that is slow; where that is
   /// clearly better, the candidates are compared by the likelihood of each with its own noise.
   bool add_slow_one() {
+    if (add_slow_one(slow_functions(input_.log))) return true;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (has_slow_noise(axis)) return add_slow_one(any_course_of_time(input_.log));
+    return false;
+  }
+
+  /// Whether there is slow noise in which an effect could hide.
+  bool has_slow_noise(std::size_t axis) const {
+    constexpr double kOfFast = 0.3;  // variances
+    const auto& unit = input_.processes.unit;
+    const Eigen::VectorXd& power = stage_.noise[axis].power;
+    double fast_V2 = stage_.own_V2[axis].mean(), slow_V2 = 0;
+    for (std::size_t i = 0; i < unit.size(); ++i) {
+      const double over_the_run = unit[i].diagonal().mean() - unit[i].mean();
+      (i < kTermB ? fast_V2 : slow_V2) += power(static_cast<Eigen::Index>(i)) * over_the_run;
+    }
+    return slow_V2 > kOfFast * fast_V2;
+  }
+
+  /// `beside`: what is slow, n × any number.
+  bool add_slow_one(const Eigen::MatrixXd& beside) {
     constexpr std::size_t kRefined = 4;
     constexpr double kWorthALook = 1e-3;
-    const Eigen::MatrixXd beside = slow_functions(input_.log);
     const EnlargedParameters& model = stage_.fit.parameters;
     const Stage rich = settle_noise(input_, model, {{}, &stage_.noise, nullptr}, beside);
     Before before{{}, &stage_.noise, &rich};
@@ -355,8 +309,7 @@ class Search {
     const double p = p_of_search(winner_log_p, static_cast<double>(looks));
     p_best_rest_ = std::min(p_best_rest_, p);
     if (p > options_.false_alarm_of_slow || !adopt(with_winner)) return false;
-    chosen_.push_back(winner->candidate);
-    p_values_.push_back(p);
+    choose(winner->candidate, p);
     return true;
   }
 
@@ -385,7 +338,8 @@ class Search {
         const double p =
             p_of_search(log_p_of(candidate, gained, gains.dof(candidate), with), looks_);
         if (p > options_.false_alarm || !adopt(with.parameters)) continue;
-        move_to_back(k, candidate, p);
+        forget(k);
+        choose(candidate, p);
         return true;
       }
     }
@@ -402,9 +356,11 @@ class Search {
            });
   }
 
-  void move_to_back(std::size_t removed, std::size_t candidate, double p) {
-    chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(removed));
-    p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(removed));
+  void forget(std::size_t k) {
+    chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(k));
+    p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  void choose(std::size_t candidate, double p) {
     chosen_.push_back(candidate);
     p_values_.push_back(p);
   }
@@ -425,8 +381,7 @@ class Search {
       if (!adopt(without.parameters)) continue;
       // What proved superfluous once would come back and go again.
       dropped_.push_back(list_.candidates[chosen_[k]].family);
-      chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(k));
-      p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(k));
+      forget(k);
     }
   }
 
@@ -455,12 +410,8 @@ class Search {
     for (std::size_t s = 0; s < subsets.size(); ++s) {
       for (const Exchange& exchange : exchanges[s]) {
         if (!adopt(exchange.parameters)) continue;
-        for (auto k = subsets[s].rbegin(); k != subsets[s].rend(); ++k) {
-          chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(*k));
-          p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(*k));
-        }
-        chosen_.push_back(exchange.candidate);
-        p_values_.push_back(exchange.p);
+        for (auto k = subsets[s].rbegin(); k != subsets[s].rend(); ++k) forget(*k);
+        choose(exchange.candidate, exchange.p);
         return true;
       }
     }

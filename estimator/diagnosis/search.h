@@ -57,7 +57,4 @@ struct SearchResult {
 SearchResult search_effects(const SearchInput& input, const CandidateList& list,
                             const SearchOptions& options);
 
-/// log of P(χ²_dof > x), also where the probability itself is no longer a double.
-double log_chi_squared_tail(double x, double dof);
-
 }  // namespace plumbline

@@ -94,6 +94,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
     std::rotate(before_g[i].rbegin(), before_g[i].rbegin() + 1, before_g[i].rend());
     if (!before_g[i].empty()) before_g[i].front() = a_g[i].front();
     drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g[i], a_g[i], a_g[i]}});
+    drivers.back().in_the_twelve = true;
   }
   drivers.push_back({"previous_pose", "a_i there", before_g});
   add("previous_pose", [&](std::size_t k) {

@@ -15,6 +15,7 @@ struct Driver {
   PerAxis<std::vector<double>> value;  ///< per axis and visit
   bool angle = false;                  ///< periodic in 2π
   bool recorded = false;               ///< a column of the measurement file
+  bool in_the_twelve = false;          ///< a bias proportional to it is what K and U₀ describe
   bool varies() const;
 };
 

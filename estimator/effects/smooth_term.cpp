@@ -93,6 +93,8 @@ class FunctionOfDriver : public SmoothTerm {
     return {low, high};
   }
   const Target& target() const { return target_; }
+  /// Whether what is linear in the driver is not to be told from the 12 parameters.
+  bool is_in_the_twelve() const { return driver_->in_the_twelve && target_.form == TermForm::bias; }
 
  private:
   DriverPointer driver_;
@@ -115,6 +117,10 @@ class Polynomial final : public FunctionOfDriver {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     std::vector<double> p(parameters().size(), target().typical_size());
     std::tie(p[0], p[1]) = range();
+    if (is_in_the_twelve()) {
+      if (degree_ == 1) return {};
+      p[2] = 0;
+    }
     return {{std::move(p)}};
   }
 
@@ -199,6 +205,35 @@ class Wave final : public FunctionOfDriver {
   }
 
   double least_, step_, most_;
+};
+
+/// Something that happened once and took a while: a bell of unknown middle and width.
+class Bell final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"middle", "", ParameterRole::shape},
+            {"width", "", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : {1.0 / 60, 1.0 / 30, 1.0 / 15}) {
+      const double width = share * (high - low);
+      for (double middle = low; middle <= high; middle += 1.5 * width)
+        starts.push_back({{middle, width, target().typical_size()}});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "bell"; }
+  double at(double value, const double* p) const override {
+    const double x = (value - p[0]) / p[1];
+    return p[2] * std::exp(-0.5 * x * x);
+  }
 };
 
 /// What a course over the dwell is multiplied with.
@@ -323,6 +358,7 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
       add_polynomials(driver, {TermForm::scale, 2}, {1, 2});
     }
     if (clock) {
+      terms.push_back(std::make_unique<Bell>(driver, Target{TermForm::bias}));
       for (const Target& target : {Target{TermForm::bias}, Target{TermForm::scale},
                                    Target{TermForm::geometry}, Target{TermForm::geometry, 0, true}})
         terms.push_back(std::make_unique<Wave>(driver, target, 1.5, 0.5, 40));

@@ -53,23 +53,31 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
     processes.decay_per_s.push_back(1 / tau_s);
     processes.unit.push_back(about_mean_of_run(bounded_walk(windows, 1 / tau_s)));
   }
+  for (const Eigen::MatrixXd& unit : processes.unit)
+    processes.is_diagonal.push_back(unit.isDiagonal(0));
   return processes;
 }
 
-Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design) {
-  const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
+Projector make_projector(Eigen::MatrixXd covariance, const Eigen::MatrixXd& design) {
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> cholesky(covariance);
   assert(cholesky.info() == Eigen::Success);
   const Eigen::MatrixXd white_design = cholesky.matrixL().solve(design);
   const Eigen::LLT<Eigen::MatrixXd> normal(white_design.transpose() * white_design);
   Projector result;
-  const Eigen::MatrixXd inverse = inverse_from_factor(cholesky.matrixLLT());
-  const Eigen::MatrixXd weighted = inverse * design;
-  result.P = inverse - weighted * normal.solve(weighted.transpose());
   result.log_determinant_of_design = 2 * normal.matrixLLT().diagonal().array().log().sum();
   result.log_determinant =
-      2 * cholesky.matrixLLT().diagonal().array().log().sum() + result.log_determinant_of_design;
+      2 * covariance.diagonal().array().log().sum() + result.log_determinant_of_design;
+  result.P = inverse_from_factor(std::move(covariance));
+  const Eigen::MatrixXd weighted = result.P * design;
+  result.P.noalias() -= weighted * normal.solve(weighted.transpose());
   return result;
 }
+
+/// What the unit covariances do to P·y and P.
+struct NoisePool::Seen {
+  Eigen::MatrixXd unit_times_py;  ///< one column per process
+  Eigen::VectorXd trace;          ///< of P times the unit covariance
+};
 
 /// Where a search for the powers stands. `normal` and `right` give the scoring step: the powers
 /// that solve normal·power = right are the next estimate, and normal/2 is the information.
@@ -86,9 +94,9 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
     : processes_(&processes), model_(model) {
   const Eigen::Index n = processes.unit.front().rows();
   assert(extra_variance.size() == 0 || extra_variance.size() == n);
-  known_ = Eigen::MatrixXd::Zero(n, n);
-  if (extra_variance.size() > 0) known_.diagonal() += extra_variance;
-  own_noise_ = known_.diagonal().minCoeff() > 0;
+  known_V2_ = Eigen::VectorXd::Zero(n);
+  if (extra_variance.size() > 0) known_V2_ = extra_variance;
+  own_noise_ = known_V2_.minCoeff() > 0;
 
   if (model.descriptions.empty() || model.descriptions.front().bins.size() < 4) return;
   // The record was described by walks that forget at different rates; each process takes the
@@ -127,10 +135,27 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
   }
 }
 
+Eigen::MatrixXd NoisePool::lower_covariance(const Eigen::VectorXd& power) const {
+  const Eigen::Index n = known_V2_.size();
+  Eigen::MatrixXd sum = known_V2_.asDiagonal();
+  std::vector<Eigen::Index> slow;
+  for (Eigen::Index i = 0; i < power.size(); ++i) {
+    if (!(power(i) > 0)) continue;
+    if (processes_->is_diagonal[static_cast<std::size_t>(i)])
+      sum.diagonal() += power(i) * processes_->unit[static_cast<std::size_t>(i)].diagonal();
+    else
+      slow.push_back(i);
+  }
+  for (Eigen::Index column = 0; column < n; ++column)
+    for (const Eigen::Index i : slow)
+      sum.col(column).tail(n - column) +=
+          power(i) * processes_->unit[static_cast<std::size_t>(i)].col(column).tail(n - column);
+  return sum;
+}
+
 Eigen::MatrixXd NoisePool::covariance(const Eigen::VectorXd& power) const {
-  Eigen::MatrixXd sum = known_;
-  for (Eigen::Index i = 0; i < power.size(); ++i)
-    if (power(i) > 0) sum += power(i) * processes_->unit[static_cast<std::size_t>(i)];
+  Eigen::MatrixXd sum = lower_covariance(power);
+  sum.triangularView<Eigen::StrictlyUpper>() = sum.transpose();
   return sum;
 }
 
@@ -173,47 +198,65 @@ NoisePool::Point NoisePool::evaluate(const Eigen::VectorXd& power, const Eigen::
   const Eigen::Index count = processes_->count();
   Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
   add_record(power, point);
-  const Projector projector = make_projector(covariance(power), design);
+  const Projector projector = make_projector(lower_covariance(power), design);
   const Eigen::VectorXd py = projector.P * mean;
   point.deviance += projector.log_determinant + mean.dot(py);
   point.likelihood_deviance = point.deviance - projector.log_determinant_of_design;
   // The average information (Gilmour, Thompson & Cullis, 1995) has the expected one's mean and
   // costs products with vectors only.
-  Eigen::MatrixXd seen(mean.size(), count);
-  Eigen::VectorXd score(count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::MatrixXd& unit = processes_->unit[static_cast<std::size_t>(i)];
-    seen.col(i) = unit * py;
-    score(i) = py.dot(seen.col(i)) - projector.P.cwiseProduct(unit).sum();
-  }
-  const Eigen::MatrixXd normal = seen.transpose() * (projector.P * seen);
+  const Seen seen = see(projector.P, py);
+  const Eigen::VectorXd score = seen.unit_times_py.transpose() * py - seen.trace;
+  const Eigen::MatrixXd normal =
+      seen.unit_times_py.transpose() * (projector.P * seen.unit_times_py);
   point.normal += normal;
   point.right += normal * power + score;
   return point;
 }
 
-Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise,
-                                          const Eigen::MatrixXd& design) const {
-  const Eigen::Index count = processes_->count();
-  const Eigen::MatrixXd P = make_projector(noise.covariance, design).P;
-  Point point{noise.power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  add_record(noise.power, point);
-  // Of processes that were estimated at zero, the ones with names are asked for all the same.
-  std::vector<Eigen::Index> wanted;
-  std::vector<Eigen::MatrixXd> seen;
-  for (Eigen::Index i = 0; i < count; ++i) {
-    if (!(noise.power(i) > 0) && (i == kTermQ || i >= NoiseProcesses::kFirstMarkov)) continue;
-    wanted.push_back(i);
-    seen.push_back(P * processes_->unit[static_cast<std::size_t>(i)]);
-  }
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      const double value = seen[i].cwiseProduct(seen[j].transpose()).sum();
-      point.normal(wanted[i], wanted[j]) += value;
-      if (i != j) point.normal(wanted[j], wanted[i]) += value;
+// The matrices are large and the arithmetic on them little: memory decides, so each lower triangle
+// is gone through once for both.
+NoisePool::Seen NoisePool::see(const Eigen::MatrixXd& P, const Eigen::VectorXd& py) const {
+  const Eigen::Index n = py.size(), count = processes_->count();
+  Seen seen{Eigen::MatrixXd::Zero(n, count), Eigen::VectorXd::Zero(count)};
+  for (Eigen::Index column = 0; column < n; ++column) {
+    const Eigen::Index below = n - column - 1;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto index = static_cast<std::size_t>(i);
+      const auto unit = processes_->unit[index].col(column);
+      seen.unit_times_py(column, i) += unit(column) * py(column);
+      seen.trace(i) += unit(column) * P(column, column);
+      if (processes_->is_diagonal[index]) continue;
+      seen.unit_times_py(column, i) += unit.tail(below).dot(py.tail(below));
+      seen.unit_times_py.col(i).tail(below) += py(column) * unit.tail(below);
+      seen.trace(i) += 2 * unit.tail(below).dot(P.col(column).tail(below));
     }
   }
-  return 0.5 * point.normal;
+  return seen;
+}
+
+Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
+                                          const std::vector<Eigen::Index>& wanted) const {
+  const Eigen::Index count = processes_->count();
+  Point record{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  add_record(power, record);
+  std::vector<Eigen::MatrixXd> seen;
+  for (const Eigen::Index i : wanted) {
+    const auto index = static_cast<std::size_t>(i);
+    const Eigen::MatrixXd& unit = processes_->unit[index];
+    if (processes_->is_diagonal[index])
+      seen.emplace_back(P * unit.diagonal().asDiagonal());
+    else
+      seen.emplace_back(P * unit);
+  }
+  Eigen::MatrixXd information = record.normal(wanted, wanted);
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
+      information(row, column) += seen[i].cwiseProduct(seen[j].transpose()).sum();
+      information(column, row) = information(row, column);
+    }
+  }
+  return 0.5 * information;
 }
 
 Eigen::VectorXd NoisePool::starting_powers() const {
@@ -221,11 +264,11 @@ Eigen::VectorXd NoisePool::starting_powers() const {
   power.head<NoiseProcesses::kFirstMarkov>() =
       noise_powers(model_).head<NoiseProcesses::kFirstMarkov>();
   // A process that the record puts at zero starts at one per cent of the white variance.
-  const Eigen::Index middle = known_.rows() / 2;
+  const Eigen::Index middle = known_V2_.size() / 2;
   const auto variance = [&](Eigen::Index i) {
     return processes_->unit[static_cast<std::size_t>(i)](middle, middle);
   };
-  const double white = power(kTermN) * variance(kTermN) + known_(middle, middle);
+  const double white = power(kTermN) * variance(kTermN) + known_V2_(middle);
   for (Eigen::Index i = kTermB; i < power.size(); ++i)
     if (!(power(i) > 0)) power(i) = 0.01 * white / variance(i);
   return power;
@@ -247,11 +290,15 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
   Point now = evaluate(first, mean, design);
   for (int iteration = 0; iteration < kIterations && !result.converged; ++iteration) {
     const Eigen::VectorXd target = nonnegative_solution(now.normal, now.right, free);
+    const Eigen::VectorXd step = target - now.power;
+    const double promised =
+        step.dot(now.right - now.normal * now.power) - 0.5 * step.dot(now.normal * step);
+    result.converged = promised < 0.1 * kEnough;
+    if (result.converged) break;
     Point next;
     bool better = false;
     for (int quartering = 0; quartering < 5 && !better; ++quartering) {
-      const Eigen::VectorXd candidate =
-          now.power + std::ldexp(1.0, -2 * quartering) * (target - now.power);
+      const Eigen::VectorXd candidate = now.power + std::ldexp(1.0, -2 * quartering) * step;
       const bool singular = !(candidate(kTermQ) + candidate(kTermN) > 0) && !own_noise_;
       if (singular) continue;
       next = evaluate(candidate, mean, design);

@@ -17,6 +17,7 @@ struct NoiseProcesses {
   static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
   std::vector<double> decay_per_s;                 ///< of the Gauss-Markov processes, slowest first
   std::vector<Eigen::MatrixXd> unit;               ///< covariance of the window means, power 1
+  std::vector<bool> is_diagonal;                   ///< of each: without memory between windows
 
   Eigen::Index count() const { return std::ssize(unit); }
 };
@@ -26,9 +27,7 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows);
 struct PooledNoise {
   Eigen::VectorXd power;       ///< one per process
   Eigen::MatrixXd covariance;  ///< n×n of the window means with these powers
-  /// Of both sources about the powers; filled by information_of() only.
-  Eigen::MatrixXd information;
-  double deviance = 0;  ///< −2 ln of the restricted likelihood but for a constant
+  double deviance = 0;         ///< −2 ln of the restricted likelihood but for a constant
   /// −2 ln of the full likelihood at these powers but for a constant: comparable between designs.
   double likelihood_deviance = 0;
   bool converged = false;
@@ -49,17 +48,21 @@ class NoisePool {
   /// mean: n; design: n×p of full rank, n > p. `start`: powers to begin with, or null.
   PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                    const Eigen::VectorXd* start = nullptr) const;
-  /// Expected information about the powers at `noise`, beside `design`. That of the means is given
-  /// for N, B, K and for what is not zero.
-  Eigen::MatrixXd information_of(const PooledNoise& noise, const Eigen::MatrixXd& design) const;
+  /// Expected information of both sources about the `wanted` powers, the others held, where the
+  /// powers are `power` and P is the projector of their Σ and of the design.
+  Eigen::MatrixXd information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
+                                 const std::vector<Eigen::Index>& wanted) const;
   /// Σ of the window means at given powers.
   Eigen::MatrixXd covariance(const Eigen::VectorXd& power) const;
   const NoiseProcesses& processes() const { return *processes_; }
 
  private:
   struct Point;
+  struct Seen;
   /// The record's restricted likelihood and its derivatives, added to `point`.
   void add_record(const Eigen::VectorXd& power, Point& point) const;
+  Eigen::MatrixXd lower_covariance(const Eigen::VectorXd& power) const;
+  Seen see(const Eigen::MatrixXd& P, const Eigen::VectorXd& py) const;
   Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                  const Eigen::MatrixXd& design) const;
   Eigen::VectorXd starting_powers() const;
@@ -67,7 +70,7 @@ class NoisePool {
   const NoiseProcesses* processes_;
   NoiseModel model_;
   bool own_noise_ = false;     ///< extra variance makes Σ regular without white noise
-  Eigen::MatrixXd known_;      ///< extra variance
+  Eigen::VectorXd known_V2_;   ///< extra variance
   Eigen::MatrixXd densities_;  ///< of the record's bins, bins × processes; empty without a record
 };
 
@@ -86,6 +89,7 @@ struct Projector {
   double log_determinant = 0;            ///< ln|Σ| + ln|X'Σ⁻¹X|
   double log_determinant_of_design = 0;  ///< ln|X'Σ⁻¹X|
 };
-Projector make_projector(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& design);
+/// Of `covariance` the lower triangle is enough.
+Projector make_projector(Eigen::MatrixXd covariance, const Eigen::MatrixXd& design);
 
 }  // namespace plumbline

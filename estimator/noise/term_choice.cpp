@@ -20,7 +20,7 @@ constexpr double kLowLimitGain = 4;
 constexpr double kHighLimitGain = 3;
 // Flicker that is barely seen has no limits to be seen: chance brings them in, and then B moves by
 // many times its own size. This much must 2·ln L fall without any flicker.
-constexpr double kClearFlicker = 12;
+constexpr double kClearFlicker = 40;
 constexpr double kQuantizationGain = 4;
 constexpr std::size_t kMostMarkov = 3;
 constexpr double kShortestTau = 5;        // samples; what is faster is the sensor's bandwidth

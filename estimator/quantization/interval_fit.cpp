@@ -43,13 +43,13 @@ double log_likelihood(const CodeCounts& codes, double u, double sigma) {
 }
 
 /// Zeroth (log), first and second central moment of N(u; mean, variance) × likelihood.
-struct Moments {
+struct TiltedMoments {
   double log_mass = 0;
   double mean = 0;
   double variance = 0;
 };
 
-Moments moments_of(const CodeCounts& codes, double sigma, double mean, double variance) {
+TiltedMoments moments_of(const CodeCounts& codes, double sigma, double mean, double variance) {
   constexpr int kPoints = 32;
   constexpr double kWidth = 6;        // standard deviations
   constexpr double kNegligible = 18;  // in log
@@ -148,7 +148,7 @@ class Propagation {
       const double cavity_variance = 1 / free;
       const double cavity_mean = cavity_variance * (mean / variance - shift_(k));
       const double total = cavity_variance + known_(k) + scatter2;
-      const Moments tilted =
+      const TiltedMoments tilted =
           moments_of(codes_[static_cast<std::size_t>(k)], sigma, cavity_mean, total);
       // The old site as it stands in the evidence …
       const double old_variance = 1 / precision_(k), old_mean = shift_(k) / precision_(k);

@@ -1,24 +1,13 @@
 #include "estimator/scalar/scalar_alternatives.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "estimator/fit/least_squares.h"
+#include "estimator/linear_algebra.h"
 
 namespace plumbline {
-namespace {
-
-Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
-  const Eigen::MatrixXd scaled =
-      columns * columns.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), columns.cols());
-}
-
-}  // namespace
-
 ScalarDirections::ScalarDirections(const ScalarData& data, const CandidateList& list,
                                    const ScalarFit& fit, const Eigen::MatrixXd& covariance) {
   const auto whitening = Whitening::of(covariance);
@@ -32,7 +21,7 @@ ScalarDirections::ScalarDirections(const ScalarData& data, const CandidateList& 
     ideal.reading[k] -= matrix.solve(excess);
   }
   set_attitudes(ideal, fit.parameters.nine);
-  model_basis_ = orthonormal(whitening->apply(scalar_jacobian(ideal, fit.parameters)));
+  model_basis_ = orthonormal_basis(whitening->apply(scalar_jacobian(ideal, fit.parameters)));
   const auto force = scalar_forces_mps2(ideal, fit.parameters);
   std::vector<Eigen::Vector3d> a_g = force;
   for (Eigen::Vector3d& a : a_g) a /= kStandardGravity_mps2;

@@ -1,7 +1,6 @@
 #include "estimator/scalar/scalar_search.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +10,7 @@
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/fit/least_squares.h"
+#include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/scalar/scalar_alternatives.h"
 
@@ -20,14 +20,6 @@ namespace {
 constexpr double kFalseAlarm = 1e-3;
 constexpr std::size_t kMostEffects = 6;
 constexpr int kReplicates = 400;
-
-Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& columns) {
-  const Eigen::MatrixXd scaled =
-      columns * columns.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal();
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
-  qr.setThreshold(1e-8);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
-}
 
 /// What the noise must not swallow: everything smooth in attitude up to the fourth order of a
 /// sensor, and drift.
@@ -52,7 +44,7 @@ Eigen::MatrixXd broad_structure(const Eigen::MatrixXd& direction, const ScalarFi
 ScalarNoise noise_of(const ScalarData& data, const ScalarSearchInput& input, const ScalarFit& fit) {
   const Eigen::MatrixXd direction = scalar_directions(data, fit.parameters);
   return scalar_noise(input.inner.blocks, fit.residual_mps2,
-                      orthonormal(broad_structure(direction, fit)), direction, input.windows);
+                      orthonormal_basis(broad_structure(direction, fit)), direction, input.windows);
 }
 
 /// log P(F > f): by the distribution itself, and by its leading term where that underflows.

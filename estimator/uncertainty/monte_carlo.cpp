@@ -158,13 +158,13 @@ Eigen::MatrixXd trials(const Model& model, std::uint64_t seed, std::size_t count
   const auto n = std::ssize(model.input.poses);
   Eigen::MatrixXd result(kParameters, static_cast<Eigen::Index>(count));
   Eigen::ArrayXd error_V(n), delta_rad = Eigen::ArrayXd::Zero(n), h_rad = delta_rad;
-  Eigen::VectorXd by_angles = Eigen::VectorXd::Zero(kParameters), twelve = by_angles;
+  Eigen::VectorXd by_angles = Eigen::VectorXd::Zero(kParameters), draws = by_angles;
   const bool turns = model.u_delta_rad > 0 || model.u_h_rad > 0;
   for (Eigen::Index trial = 0; trial < result.cols(); ++trial) {
     const double relative = model.u_gamma * random.normal();
     if (turns && !model.bends) {
-      for (double& value : twelve) value = random.normal();
-      by_angles = model.angle_root * twelve;
+      for (double& draw : draws) draw = random.normal();
+      by_angles = model.angle_root * draws;
     }
     for (Eigen::Index k = 0; model.bends && k < n; ++k) {
       delta_rad(k) = model.u_delta_rad * random.normal();

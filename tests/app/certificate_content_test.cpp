@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "app/certificate/budget.h"
+#include "app/certificate/dcc/dcc_writer.h"
 #include "app/certificate/effect_words.h"
 #include "app/certificate/sensor_terms.h"
 #include "app/certificate/table_columns.h"
@@ -124,11 +125,28 @@ TEST(EffectWords, EveryEffectHasANameInBothLanguages) {
   EXPECT_EQ(effect_name("covariate:rh_pct", en), "influence of the recorded column rh_pct");
 }
 
+TEST(EffectWords, EveryEffectHasATermInBothLanguages) {
+  const Translator en(Language::en), uk(Language::uk);
+  for (const Effect* effect : effect_catalogue()) {
+    const std::string term = effect_term(effect->id(), en);
+    EXPECT_NE(term, "") << effect->id();
+    EXPECT_NE(effect_term(effect->id(), uk), "") << effect->id();
+    // Its parameters are in it, or are what it says in words.
+    if (effect->parameters().size() == 1) {
+      EXPECT_THAT(term, HasSubstr(effect->parameters().front().name)) << effect->id();
+    }
+  }
+  EXPECT_THAT(uk.missing(), testing::IsEmpty());
+  EXPECT_EQ(effect_term("sensor.quadratic+sensor.drift", en), "k2·a_i²; d·t");
+  EXPECT_THAT(effect_term("covariate:rh_pct", en), HasSubstr("the column rh_pct"));
+  EXPECT_EQ(effect_term("own.effect", en), "");
+}
+
 TEST(EffectWords, ParametersAsTheyArePrinted) {
   EXPECT_EQ(parameter_text({"k2", 0, 0.012345, 0.0002, "g/g^2"}),
             "k2 (x) = (0.01235 ± 0.00040) g/g²");
   EXPECT_EQ(parameter_text({"n", {}, 5, 0, ""}), "n = 5");
-  EXPECT_EQ(parameter_text({"epsilon", {}, -0.1, 0.01, "deg"}), "epsilon = (−0.100 ± 0.020) °");
+  EXPECT_EQ(parameter_text({"epsilon", {}, -0.1, 0.01, "deg"}), "epsilon = (−0.100 ± 0.020)°");
 }
 
 // --- what must be said ---
@@ -141,6 +159,7 @@ TEST(Certificate, EffectsInWordsAndNumbersWithTheirRivals) {
   EXPECT_THAT(html, HasSubstr("k2 (x) = (0.00212 ± 0.00022) g/g²"));
   EXPECT_THAT(html, HasSubstr("scale factor asymmetry (sensor.asymmetry)"));
   EXPECT_THAT(html, HasSubstr("To tell them apart: poses with h below the horizon"));
+  EXPECT_THAT(html, HasSubstr("<dt>second-order nonlinearity (K2)</dt><dd>k2·a_i²</dd>"));
   EXPECT_THAT(html, HasSubstr("x, before"));
   EXPECT_THAT(html, HasSubstr("<td>58.2</td><td>29.1</td>"));  // left-out poses, before and after
 }
@@ -164,7 +183,8 @@ TEST(Certificate, TellsWhatWasOutOfTheOrdinaryAndCountsTheRest) {
   EXPECT_THAT(html, HasSubstr("Not listed: 1047 changes of state"));
   EXPECT_THAT(html, HasSubstr("retried pose 110"));
   EXPECT_THAT(html, Not(HasSubstr("retried pose 120")));
-  EXPECT_THAT(html, HasSubstr("Further events of the kind “retry” that are kept with the run: 23."));
+  EXPECT_THAT(html,
+              HasSubstr("Further events of the kind “retry” that are kept with the run: 23."));
 }
 
 TEST(Certificate, WhatWasLookedForAndNotFound) {
@@ -173,7 +193,7 @@ TEST(Certificate, WhatWasLookedForAndNotFound) {
   input.not_found = {{"rig.backlash", {}, "w", 0.0123, "deg"}};
   const std::string html = write_html(make_certificate(input));
   EXPECT_THAT(html, HasSubstr("Looked for and not found"));
-  EXPECT_THAT(html, HasSubstr("<td class=\"words\">w</td><td>0.012 °</td>"));
+  EXPECT_THAT(html, HasSubstr("<td class=\"words\">w</td><td>0.012°</td>"));
 }
 
 TEST(Certificate, UkrainianLeavesNothingUntranslated) {
@@ -202,9 +222,38 @@ TEST(Certificate, UnfinishedRunIsToldOnTheFirstPage) {
   const Document english = make_certificate(example.input());
   EXPECT_EQ(english.summary.front(), "The run is not finished: stopped after 42 poses.");
   EXPECT_EQ(english.tone, Tone::warning);
+  EXPECT_EQ(english.headline, "Run not finished");
   example.language = Language::uk;
-  EXPECT_EQ(make_certificate(example.input()).summary.front(),
-            "Вимірювання не завершено: зупинено після 42 положень.");
+  const Document ukrainian = make_certificate(example.input());
+  EXPECT_EQ(ukrainian.summary.front(), "Вимірювання не завершено: зупинено після 42 положень.");
+  EXPECT_EQ(ukrainian.headline, "Вимірювання не завершено");
+}
+
+// The poses that it never reached may hold the largest error: it can fail, not pass.
+TEST(Certificate, UnfinishedRunDoesNotPass) {
+  CertificateExample example;
+  example.calibration.decision = {DecisionStatus::pass, 0.2, 0.1, 0.01, 0.02, ""};
+  EXPECT_EQ(make_certificate(example.input()).headline, "PASS");
+  example.events = {{0, "incomplete", "the run is not finished: stopped after 42 poses"}};
+  for (const Language language : {Language::en, Language::uk}) {
+    example.language = language;
+    for (const DecisionStatus status : {DecisionStatus::pass, DecisionStatus::conditional_pass}) {
+      example.calibration.decision.status = status;
+      const std::string html = example.html();
+      for (const char* word : {"PASS", "ВІДПОВІДАЄ"}) EXPECT_THAT(html, Not(HasSubstr(word)));
+    }
+    const Document document = make_certificate(example.input());
+    const std::string xml = write_dcc(example.input(), document, {});
+    EXPECT_THAT(xml, Not(HasSubstr("conformity>")));
+    EXPECT_THAT(xml, HasSubstr(document.headline));
+  }
+  EXPECT_THAT(example.html(), HasSubstr("<dd>немає: вимірювання не завершено"));
+  example.language = Language::en;
+  EXPECT_THAT(example.html(), HasSubstr("<dd>none: the run was not finished"));
+  example.calibration.decision.status = DecisionStatus::fail;
+  const Document failed = make_certificate(example.input());
+  EXPECT_EQ(failed.headline, "Run not finished: FAIL");
+  EXPECT_THAT(write_dcc(example.input(), failed, {}), HasSubstr("<dcc:conformity>fail<"));
 }
 
 TEST(Certificate, UkrainianForWhatTheCoreSays) {

@@ -24,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr const char* kCreated = "2026-01-31T12:34:56Z";
 
@@ -138,6 +139,18 @@ TEST_F(CertificatePdf, SaysWordForWordWhatTheHtmlSays) {
   expect_same_words(example, write("words-uk.pdf", pdf_of(make_certificate(example.input()))));
 }
 
+// What a reader sees first of a run that was stopped, in the PDF as in the other two.
+TEST_F(CertificatePdf, UnfinishedRunIsNotHeadedPass) {
+  CertificateExample example;
+  example.calibration.decision = {DecisionStatus::pass, 0.2, 0.1, 0.01, 0.02, ""};
+  EXPECT_THAT(page_texts(write("pass.pdf", pdf_of(make_certificate(example.input())))).front(),
+              HasSubstr("\nPASS\n"));
+  example.events = {{0, "incomplete", "the run is not finished: aborted after 17 poses"}};
+  const auto path = write("not-pass.pdf", pdf_of(make_certificate(example.input())));
+  EXPECT_THAT(page_texts(path).front(), HasSubstr("\nRun not finished\n"));
+  for (const std::string& page : page_texts(path)) EXPECT_THAT(page, Not(HasSubstr("PASS")));
+}
+
 TEST_F(CertificatePdf, EveryPageCarriesNumberAndPageCount) {
   const Document document = make_certificate(CertificateExample().input());
   auto pages = page_texts(write("feet.pdf", pdf_of(document)));
@@ -201,9 +214,16 @@ std::vector<std::vector<Word>> word_boxes(const fs::path& pdf) {
 }
 
 void expect_tidy(const fs::path& pdf) {
+  constexpr double kFoot = 785, kLeastFilled = 540;  // pt from the top
   const auto pages = word_boxes(pdf);
   ASSERT_FALSE(pages.empty());
   for (std::size_t p = 0; p < pages.size(); ++p) {
+    double lowest = 0;
+    for (const Word& word : pages[p]) {
+      if (word.bottom < kFoot) lowest = std::max(lowest, word.bottom);
+    }
+    EXPECT_TRUE(p + 1 == pages.size() || lowest > kLeastFilled)
+        << "page " << p + 1 << " of " << pages.size() << " is filled to " << lowest << " pt only";
     for (std::size_t i = 0; i < pages[p].size(); ++i) {
       const Word& a = pages[p][i];
       EXPECT_TRUE(a.left >= 44 && a.right <= 595.3 - 44 && a.top >= 40 && a.bottom <= 841.9 - 14)
@@ -239,6 +259,7 @@ TEST_F(CertificatePdf, NothingOverflowsOrOverlaps) {
   aborted.calibration.diagnosis.verdict = Verdict::undetermined;
   aborted.calibration.diagnosis.reason = "17 poses are too few";
   for (auto& noise : aborted.calibration.noise) noise = {};
+  aborted.calibration.decision = {DecisionStatus::pass, 0.2, 0.1, 0.01, 0.02, ""};
   aborted.events = {{0, "incomplete", "the run is not finished: aborted after 17 poses"}};
   expect_tidy(write("aborted.pdf", pdf_of(make_certificate(aborted.input()))));
 }

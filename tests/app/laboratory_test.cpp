@@ -22,7 +22,7 @@ TEST(Laboratory, EveryKeyIsOptional) {
   const auto lab = parse_laboratory("", "lab.toml");
   ASSERT_TRUE(lab) << lab.error().message;
   EXPECT_EQ(lab->laboratory.place(), "");
-  EXPECT_EQ(lab->location, "laboratory");
+  EXPECT_EQ(lab->location, "");
 }
 
 TEST(Laboratory, ExampleIsReadAndPrinted) {

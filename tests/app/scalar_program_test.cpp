@@ -78,6 +78,38 @@ TEST(ScalarProgram, PosesWithNamedColumns) {
   EXPECT_EQ(first.dump(), second.dump());
 }
 
+// The certificate has the three forms of any other, and says what lab.toml does.
+TEST(ScalarProgram, CertificateOfALaboratory) {
+  const TempFolder folder;
+  write_text(folder / "s.csv", rows(true, "t_s,pose,ax_raw,ay_raw,az_raw"));
+  write_text(
+      folder / "lab.toml",
+      "[laboratory]\nname = \"Lab 7\"\ncountry = \"UA\"\n[authorised_by]\nname = \"A. Boss\"\n");
+  const auto more =
+      arguments(folder, {"--columns", "x=ax_raw,y=ay_raw,z=az_raw", "--lab", folder / "lab.toml"});
+  const auto outcome = run_plumbline(more);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string html = text_of(folder / "out" / "certificate.html");
+  for (const char* text : {"Lab 7", "A. Boss", "Accreditation", "Calibrated without angles"}) {
+    EXPECT_THAT(html, HasSubstr(text));
+  }
+  const auto verify = [&] { return run_plumbline({"verify", folder / "out"}); };
+  const auto good = verify();
+  EXPECT_EQ(good.exit_code, 0) << good.out << good.err;
+  for (const char* list : {"bias", "scale", "nonorthogonality"}) {
+    EXPECT_THAT(good.out, HasSubstr(fmt::format("XML and result.json agree in {}", list)));
+  }
+  // Another number in result.json is noticed as such, not only by its hash.
+  std::string result = text_of(folder / "out" / "result.json");
+  const std::size_t at = result.find("\"bias\": [");
+  ASSERT_NE(at, std::string::npos);
+  result.replace(result.find("3", at), 1, "4");
+  write_text(folder / "out" / "result.json", result);
+  const auto bad = verify();
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_THAT(bad.out, HasSubstr("FAILED XML and result.json agree in bias"));
+}
+
 TEST(ScalarProgram, ContinuousRecordIsCutIntoRests) {
   const TempFolder folder;
   write_text(folder / "s.csv", rows(false, "t_s,ux_V,uy_V,uz_V"));
@@ -115,9 +147,9 @@ TEST(ScalarProgram, BadInputIsOneLineAndCode2) {
   EXPECT_EQ(run_plumbline(arguments(folder, {"--skip-bad-rows"})).exit_code, 0);
 
   // Not used without angles, and not ignored without a word.
-  outcome = run_plumbline(arguments(folder, {"--language", "uk"}));
+  outcome = run_plumbline(arguments(folder, {"--static", folder / "s.csv"}));
   EXPECT_EQ(outcome.exit_code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("--language"));
+  EXPECT_THAT(outcome.err, HasSubstr("--static"));
   EXPECT_EQ(outcome.error_lines(), 1);
 
   outcome = run_plumbline(arguments(folder, {"--columns", "x=ux_V,y=uy_V"}));

@@ -113,8 +113,10 @@ class SequencerRun : public testing::Test {
     std::this_thread::sleep_for(std::chrono::duration<double>(2 / kSpeed));  // 2 s for the rig
     const auto later = (*head)->status();
     ASSERT_TRUE(later.has_value());
-    EXPECT_EQ(first->actual.delta_deg, later->actual.delta_deg);
-    EXPECT_EQ(first->actual.h_deg, later->actual.h_deg);
+    // What was stopped from full speed still rings a little; what was not, turns by tens of
+    // degrees.
+    EXPECT_NEAR(first->actual.delta_deg, later->actual.delta_deg, 0.02);
+    EXPECT_NEAR(first->actual.h_deg, later->actual.h_deg, 0.02);
     EXPECT_EQ(later->alarm[0], 0) << rig::alarm_text(later->alarm[0]);
   }
 

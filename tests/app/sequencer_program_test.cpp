@@ -1,4 +1,5 @@
-// The program `plumbline run` from outside: signals, sudden death, resumption, a silent bus.
+// The program `plumbline run` from outside: signals, sudden death, resumption, a silent bus, and
+// the station page that it serves meanwhile.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <signal.h>
@@ -12,13 +13,16 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "app/config/rig_description.h"
 #include "app/sequencer/simulated_rig.h"
+#include "app/station/http.h"
 #include "storage/run_store.h"
+#include "tests/app/http_client.h"
 
 namespace plumbline::app {
 namespace {
@@ -77,7 +81,7 @@ class RunProgram : public testing::Test {
         << "\"\nsilence_timeout_ms = 800\n";
   }
 
-  void start(bool resume = false) {
+  void start(bool resume = false, const std::vector<std::string>& further = {}) {
     std::vector<std::string> words = {std::string(PLUMBLINE_BINARY_DIR) + "/plumbline",
                                       "run",
                                       "--config",
@@ -89,6 +93,7 @@ class RunProgram : public testing::Test {
                                       "--out",
                                       folder_ / "out"};
     if (resume) words.emplace_back("--resume");
+    words.insert(words.end(), further.begin(), further.end());
     std::vector<char*> arguments;
     for (std::string& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -190,6 +195,112 @@ TEST_F(RunProgram, SilentBusEndsTheRunSafely) {
   EXPECT_EQ(summary().state, RunState::failed);
   EXPECT_FALSE(fs::exists(folder_ / "out/result.json"));
   expect_motors_at_rest();
+}
+
+/// `plumbline run --serve` on a port of its own.
+class ServedRun : public RunProgram {
+ protected:
+  void start_serving() {
+    start_rig();
+    start(false, {"--serve", "--control", "--listen", "127.0.0.1:0"});
+    const std::string mark = "station: http://127.0.0.1:";
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (said().find("/\n") == std::string::npos && std::chrono::steady_clock::now() < limit) {
+      std::this_thread::sleep_for(milliseconds{5});
+    }
+    const std::size_t at = said().find(mark);
+    ASSERT_NE(at, std::string::npos) << said();
+    port_ = std::stoi(said().substr(at + mark.size()));
+    host_ = "Host: 127.0.0.1:" + std::to_string(port_) + "\r\n";
+  }
+  nlohmann::json get(const std::string& path) const {
+    const Answer answer =
+        app::exchange(port_, "GET " + path + " HTTP/1.1\r\n" + host_ + "Connection: close\r\n\r\n");
+    EXPECT_EQ(answer.status, 200) << path;
+    return nlohmann::json::parse(answer.body, nullptr, false);
+  }
+  int order(const std::string& word) const {
+    const std::string body = "{\"order\":\"" + word + "\"}";
+    const auto csrf = get("/api/station")["csrf"].get<std::string>();
+    return app::exchange(port_, "POST /api/order HTTP/1.1\r\n" + host_ + "Origin: http://" +
+                                    host_.substr(6) + "Content-Type: application/json\r\n" +
+                                    "X-CSRF-Token: " + csrf + "\r\nConnection: close\r\n" +
+                                    "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" +
+                                    body)
+        .status;
+  }
+  Connection viewer() const {
+    Connection connection(port_, 60);
+    connection.send("GET /api/stream HTTP/1.1\r\n" + host_ + "\r\n");
+    return connection;
+  }
+  /// Waits until the session says of itself that it is in this state.
+  void wait_for_state(const std::string& state) const {
+    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    nlohmann::json live;
+    while (std::chrono::steady_clock::now() < limit) {
+      live = get("/api/live");
+      if (live["phase"] == "running" && live["status"]["state"] == state) return;
+      std::this_thread::sleep_for(milliseconds{20});
+    }
+    FAIL() << state << ", but it is " << live.dump();
+  }
+
+  int port_ = 0;
+  std::string host_;
+};
+
+TEST_F(ServedRun, PageShowsTheRunAndGivesOrders) {
+  start_serving();
+  wait_for_poses(2);
+  std::vector<Connection> viewers;
+  for (int i = 0; i < 16; ++i) viewers.push_back(viewer());
+  for (Connection& one : viewers) {
+    EXPECT_THAT(one.receive_until("data: "), HasSubstr("200 OK"));
+  }
+  EXPECT_EQ(get("/api/live")["run"]["serial"], "A-1");
+  EXPECT_FALSE(get("/api/trace")["trace"].empty());
+  EXPECT_EQ(order("pause"), 200);
+  wait_for_state("paused");
+  const long long before = summary().poses;
+  std::this_thread::sleep_for(milliseconds{500});
+  EXPECT_EQ(summary().poses, before);
+  EXPECT_EQ(order("resume"), 200);
+
+  // Everybody hears what came out before the program ends.
+  for (Connection& one : viewers) {
+    const std::string& seen = one.receive_until("\"decision\":");
+    EXPECT_THAT(seen, HasSubstr("\"phase\":\"finished\""));
+    EXPECT_THAT(seen, HasSubstr("\"decision\":"));
+  }
+  EXPECT_EQ(wait_for_end(), 0) << said();
+  EXPECT_EQ(summary().state, RunState::finished);
+  EXPECT_EQ(summary().poses, kSteps);
+  EXPECT_FALSE(Connection(port_).open()) << "the page ends with the run";
+}
+
+TEST_F(ServedRun, StopFromThePageEndsTheRunSafely) {
+  start_serving();
+  wait_for_poses(2);
+  Connection one = viewer();
+  one.receive_until("data: ");
+  EXPECT_EQ(order("stop"), 200);
+  EXPECT_THAT(one.receive_until("\"phase\":\"stopped\""), HasSubstr("\"phase\":\"stopped\""));
+  EXPECT_EQ(wait_for_end(), 3);
+  EXPECT_THAT(said(), HasSubstr("plumbline run --resume"));
+  EXPECT_EQ(summary().state, RunState::stopped);
+  expect_motors_at_rest();
+}
+
+TEST_F(RunProgram, PortThatIsTakenIsSaidBeforeAnythingMoves) {
+  const auto other = HttpServer::start(
+      {"127.0.0.1", 0}, [](const HttpRequest& /*request*/) { return HttpReply::text(200, ""); });
+  ASSERT_TRUE(other.has_value());
+  start_rig();
+  start(false, {"--serve", "--listen", (*other)->address().text()});
+  EXPECT_EQ(wait_for_end(), 2);
+  EXPECT_THAT(said(), HasSubstr("cannot listen there"));
+  EXPECT_FALSE(fs::exists(folder_ / "run.db"));
 }
 
 }  // namespace

@@ -405,6 +405,22 @@ TEST_F(Verify, XmlHasTheNumbersOfResultJson) {
       EXPECT_DOUBLE_EQ(si->values[j], native->values[j] / kStandardGravity_mps2);
     }
   }
+  // Noise, as the same terms.
+  static constexpr std::pair<const char*, const char*> kTerms[] = {
+      {"Q", "\\volt\\second"},
+      {"N", "\\volt\\second\\tothe{0.5}"},
+      {"B", "\\volt"},
+      {"K", "\\volt\\second\\tothe{-0.5}"},
+      {"R", "\\volt\\second\\tothe{-1}"}};
+  for (const auto& [term, unit] : kTerms) {
+    const XmlList* list = dcc->list(std::string(term) + "_x", unit);
+    ASSERT_NE(list, nullptr) << term;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const auto& stated = json["noise"][kAxisName[i]][term];
+      EXPECT_EQ(list->values[i], stated["value"].get<double>()) << term << kAxisName[i];
+      EXPECT_EQ(list->expanded[i], 2 * stated["u"].get<double>()) << term << kAxisName[i];
+    }
+  }
 }
 
 TEST_F(Verify, SignedByTheLaboratory) {

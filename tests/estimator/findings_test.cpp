@@ -64,6 +64,30 @@ TEST(Findings, SingleReadingsOfAnUndeclaredConverterProveNoStep) {
   EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
 }
 
+TEST(Findings, AnUnlistedFunctionOfTheOwnAxisLeavesItsSensitivityAlone) {
+  SyntheticOptions options;
+  options.more_x_V = [](double a_g, double) { return 5e-4 * std::legendre(5, a_g / 1.001); };
+  const SyntheticRun data = synthetic_run(4, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U) << result.diagnosis.reason;
+  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "a_x");
+  const AxisEstimate& x = result.final.batch_ls[0];
+  EXPECT_NEAR(x.value(0), data.truth[0][0], 0.01 * data.truth[0][0]);
+  EXPECT_LT(std::sqrt(x.covariance(0, 0)), 0.005 * data.truth[0][0]);
+}
+
+TEST(Findings, WhatHappenedOnceIsNoSlowNoise) {
+  SyntheticOptions options;
+  options.more_x_V = [](double, double t_s) {
+    return 1e-3 * std::exp(-0.5 * std::pow((t_s - 150) / 9, 2));
+  };
+  const Calibration result = calibrated(synthetic_run(5, kSixteenBits, options));
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U) << result.diagnosis.reason;
+  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "t_s");
+  EXPECT_EQ(result.diagnosis.unlisted.front().form, "bias");
+  EXPECT_LT(result.after.fit_pose_rms_mps2[0], 1.2 * result.floor_pose_rms_mps2[0]);
+}
+
 TEST(DetectionLimits, StandForEverythingThatWasNotFound) {
   const SyntheticRun data = synthetic_run(2, kSixteenBits);
   const Calibration result = calibrated(data);

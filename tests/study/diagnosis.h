@@ -10,6 +10,14 @@
 //
 // Oracle: the same unit, head, room, noise and seed without the effect, fitted by generalised least
 // squares under the true covariance, scored on the same left-out blocks and fresh poses.
+//
+// Fresh poses: the oracle's readings hold no effect, so it needs no past; a model with an effect
+// that remembers does. All are therefore scored on the session as one record, in which the fresh
+// poses follow those of the run, and without the first fresh pose, before which the head was homed
+// and of whose predecessor the record says nothing. What evaluate() makes of the fresh poses as a
+// file of their own stands beside it.
+//
+// Effects outside the list: what counts as the right driver stands in diagnosis_own.cpp.
 #pragma once
 
 #include <Eigen/Core>
@@ -66,8 +74,8 @@ struct StudyEffect {
   const char* name;  ///< id of the simulated effect; `:bias` or `:scale` appended to a column
   const char* axes;  ///< those of which one is drawn, "xyz"; "" for the head: no choice
   double largest;    ///< amplitude beyond which a size cannot be had with this design
-  /// Names that say the same thing.
-  std::vector<std::string> synonyms;
+  /// Outside the list: listed names that are no false claim, see diagnosis_own.cpp.
+  std::vector<std::string> near;
   /// Drivers that count as right, for effects outside the list; empty for listed ones.
   std::vector<std::string> drivers;
   /// Parameters for an amplitude of 1; those named in `scaled` are multiplied by the amplitude.
@@ -75,6 +83,10 @@ struct StudyEffect {
   std::vector<std::string> scaled;
 };
 const std::vector<StudyEffect>& study_effects();
+/// Those outside the list; part of study_effects().
+std::vector<StudyEffect> own_study_effects();
+/// A random sign for the amplitude of that name.
+DrawParameters either_sign(const char* name);
 /// nullptr when there is none of that name.
 const StudyEffect* find_study_effect(const std::string& name);
 /// Names of all listed effects (true) or all outside the list (false), in the order of the table.
@@ -106,28 +118,33 @@ struct Errors {
   double heldout = 0;  ///< on left-out blocks of time and of position
 };
 
-struct SetOutcome {
-  SetDesign design;
-  bool feasible = true;
-  std::string truth;  ///< effects as simulated, in words
-  std::vector<double> size;
-  std::vector<double> sigma;
-  std::string found;  ///< what was reported, in words
-  Verdict verdict = Verdict::undetermined;
-  double p_value = 1;
-  double heldout_gain = 0;  ///< of the best finding
-
+/// What a search claimed, held against the truth.
+struct Claims {
+  std::string found;        ///< what was reported, in words
   int effects = 0;          ///< true ones
   int named = 0;            ///< id and axes right
   int named_or_stated = 0;  ///< these, and those among the stated alternatives of a finding
   int wrong = 0;            ///< findings, listed or unlisted, that stand for no true effect
   int unlisted = 0;         ///< of the findings
-  int driver_right = 0;     ///< true effects outside the list found under a right driver
-  int listed_instead = 0;   ///< listed names claimed where only effects outside the list are
+  int driver_right = 0;     ///< true effects outside the list whose driver was told
+  int near_name = 0;        ///< of these, by a listed name alone (StudyEffect::near)
+  int listed_instead = 0;   ///< other listed names where only effects outside the list are
 
   int missed() const { return effects - named_or_stated - driver_right; }
   /// Findings beyond those that stand for, or in place of, a true effect.
   int additional() const { return std::max(0, wrong - missed()); }
+  bool any() const { return wrong + named_or_stated + driver_right > 0; }
+};
+
+struct SetOutcome : Claims {
+  SetDesign design;
+  bool feasible = true;
+  std::string truth;  ///< effects as simulated, in words
+  std::vector<double> size;
+  std::vector<double> sigma;
+  Verdict verdict = Verdict::undetermined;
+  double p_value = 1;
+  double heldout_gain = 0;  ///< of the best finding
 
   int parameters = 0, parameters_within = 0;  ///< of named effects, within ±1.96·u
   int K_within = 0, U0_within = 0;            ///< of 9 and 3, of the certified model
@@ -135,8 +152,32 @@ struct SetOutcome {
 
   Errors before, after, oracle;
   double plain_oracle_fresh = 0;  ///< ordinary least squares without the effect
+  double evaluated_fresh = 0;     ///< evaluate() on the fresh poses as a file of their own
   double seconds = 0;             ///< of calibrate()
+
+  Claims naive;            ///< of the naive search
+  double naive_fresh = 0;  ///< its error after
 };
+
+SetOutcome run_set(const SetDesign& design);
+/// Scores a calibration of a set; run_set() is make_set(), calibrate(), this and the naive search.
+SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration& calibration);
+/// A diagnosis held against the truth.
+Claims check_claims(const SetDesign& design, const StudySet& set, const Diagnosis& diagnosis);
+/// Root mean square over the axes.
+double over_axes(const PerAxis<double>& rms_mps2);
+/// The fresh poses appended to the run: one record on one clock.
+MeasurementSet session(const StudySet& set);
+
+/// What most people would do: forward selection by BIC on the pose means, as if their noise were
+/// white and of one size per axis. Same candidates (and preference for names), linearised about the
+/// 12 parameters with shapes and indices where a search starts, until none lowers the BIC or ten
+/// are taken.
+struct NaiveResult {
+  Diagnosis diagnosis;  ///< effects and unlisted only: ids, axes, drivers
+  double fresh_mps2 = 0;
+};
+NaiveResult search_naively(const StudySet& set);
 
 SetOutcome run_set(const SetDesign& design);
 /// Scores a calibration of a set; run_set() is make_set(), calibrate() and this.
@@ -147,7 +188,7 @@ Result<void> dump(const StudySet& set, const std::string& folder);
 
 // --- tables --------------------------------------------------------------------------------------
 
-/// 95 % limits of a share, k out of n (Wilson, 1927).
+/// 95 % limits of a share, k out of n (Clopper & Pearson, 1934): exact, never too narrow.
 struct Share {
   int k = 0;
   int n = 0;
@@ -158,7 +199,23 @@ struct Share {
 std::string csv_header();
 /// One line; its last column is the command line that makes the same set again.
 std::string csv_row(const SetOutcome& outcome);
-/// One block of lines: what the issue asks for, over the given sets.
+/// The command line that makes the same set again: tells the sets of a study apart.
+std::string reproduce(const SetDesign& design);
+/// Rows of an earlier piece of a study; a last line that was cut short is left out. `name` stands
+/// for the text in messages. Errors: ErrorCode::input for rows of another version of the study.
+Result<std::vector<SetOutcome>> read_csv(const std::string& text, const std::string& name);
+/// Tables of what the issue asks for, for each kind of set among the given ones.
 std::string summary(const std::vector<SetOutcome>& outcomes, double detectable_sigma);
+
+/// Kinds of sets, each with tables of its own.
+enum class SetKind { clean, single, multiple, own };
+SetKind kind_of(const SetDesign& design);
+
+/// By their names in command lines and tables.
+NoiseKind noise_of(const std::string& name);
+sim::RecordOrder order_of(const std::string& name);
+/// "a+b" in parts; none for "none".
+std::vector<std::string> effect_parts(const std::string& names);
+std::string joined_name(const SetDesign& design);
 
 }  // namespace plumbline::study

@@ -13,10 +13,6 @@ using Parameters = std::map<std::string, double>;
 DrawParameters only(const char* name) {
   return [name](const DrawContext&) -> Parameters { return {{name, 1.0}}; };
 }
-/// With a random sign.
-DrawParameters either_sign(const char* name) {
-  return [name](const DrawContext& at) -> Parameters { return {{name, at.random.sign()}}; };
-}
 /// Two components in a random direction.
 DrawParameters direction(const char* first, const char* second) {
   return [first, second](const DrawContext& at) -> Parameters {
@@ -65,10 +61,8 @@ Parameters pose_outlier(const DrawContext& at) {
   return {{"delta", std::cos(angle)}, {"h", std::sin(angle)}};
 }
 
-}  // namespace
-
-const std::vector<StudyEffect>& study_effects() {
-  static const std::vector<StudyEffect> all = {
+std::vector<StudyEffect> listed_study_effects() {
+  return {
       {"sensor.quadratic", "xyz", 0.5, {}, {}, either_sign("k2"), {"k2"}},
       {"sensor.cubic", "xyz", 0.5, {}, {}, either_sign("k3"), {"k3"}},
       // On z, which sees no negative a, asymmetry is a scale factor and a dead zone one ring.
@@ -107,6 +101,20 @@ const std::vector<StudyEffect>& study_effects() {
       {"covariate:motor_A:bias", "xyz", 5, {}, {}, either_sign("c"), {"c"}},
       {"covariate:motor_A:scale", "xyz", 5, {}, {}, either_sign("c"), {"c"}},
   };
+}
+
+}  // namespace
+
+DrawParameters either_sign(const char* name) {
+  return [name](const DrawContext& at) -> Parameters { return {{name, at.random.sign()}}; };
+}
+
+const std::vector<StudyEffect>& study_effects() {
+  static const std::vector<StudyEffect> all = [] {
+    std::vector<StudyEffect> effects = listed_study_effects();
+    for (StudyEffect& own : own_study_effects()) effects.push_back(std::move(own));
+    return effects;
+  }();
   return all;
 }
 

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/diagnosis/explain.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/fit/least_squares.h"
@@ -16,12 +18,6 @@ namespace plumbline::study {
 namespace {
 
 constexpr double kCoverage = 1.96;  // of a 95 % interval, in u
-
-double over_axes(const PerAxis<double>& rms_mps2) {
-  double sum = 0;
-  for (const double value : rms_mps2) sum += value * value;
-  return std::sqrt(sum / kAxisCount);
-}
 
 std::string axes_text(const std::vector<std::size_t>& axes) {
   std::string text;
@@ -62,7 +58,7 @@ bool states(const FoundEffect& found, const std::string& id) {
 
 /// Which true effect each finding stands for, and the other way round.
 void match(const std::vector<sim::EffectSetting>& truth, const Diagnosis& diagnosis,
-           SetOutcome& outcome) {
+           Claims& outcome) {
   std::vector<bool> used(diagnosis.effects.size(), false);
   std::vector<bool> settled(truth.size(), false);
   for (std::size_t t = 0; t < truth.size(); ++t) {
@@ -94,26 +90,56 @@ void match(const std::vector<sim::EffectSetting>& truth, const Diagnosis& diagno
   outcome.unlisted = static_cast<int>(diagnosis.unlisted.size());
 }
 
-/// Drivers of effects outside the list.
-void match_drivers(const SetDesign& design, const Diagnosis& diagnosis, SetOutcome& outcome) {
+/// True when `driver` is one of the right ones, in which `_i` stands for any of the axes.
+bool is_right_driver(const StudyEffect& effect, const std::vector<std::size_t>& axes,
+                     const std::string& driver) {
+  return std::any_of(effect.drivers.begin(), effect.drivers.end(), [&](const std::string& right) {
+    if (!right.ends_with("_i")) return driver == right;
+    return std::any_of(axes.begin(), axes.end(), [&](std::size_t axis) {
+      return driver == right.substr(0, right.size() - 1) + kAxisName[axis];
+    });
+  });
+}
+
+/// Effects outside the list: which findings name their drivers, which are listed names that are no
+/// false claim (diagnosis_own.cpp), and which are claimed instead.
+void match_drivers(const SetDesign& design, const std::vector<sim::EffectSetting>& truth,
+                   const Diagnosis& diagnosis, Claims& outcome) {
+  std::vector<bool> right(diagnosis.unlisted.size(), false);
+  std::vector<bool> near(diagnosis.effects.size(), false);
   bool any_listed = false;
-  for (const std::string& name : design.effects) {
-    const StudyEffect* effect = find_study_effect(name);
+  for (std::size_t t = 0; t < truth.size(); ++t) {
+    const StudyEffect* effect = find_study_effect(design.effects[t]);
     assert(effect != nullptr);
     if (effect->drivers.empty()) {
       any_listed = true;
       continue;
     }
-    const bool right = std::any_of(
-        diagnosis.unlisted.begin(), diagnosis.unlisted.end(), [&](const UnlistedStructure& found) {
-          return std::find(effect->drivers.begin(), effect->drivers.end(), found.driver) !=
-                 effect->drivers.end();
-        });
-    outcome.driver_right += right ? 1 : 0;
+    bool by_driver = false;
+    for (std::size_t f = 0; f < right.size(); ++f) {
+      const UnlistedStructure& found = diagnosis.unlisted[f];
+      if (!is_right_driver(*effect, truth[t].axes, found.driver)) continue;
+      if (!covers_axes(truth[t], found.axes)) continue;
+      by_driver = right[f] = true;
+    }
+    bool by_name = false;
+    for (std::size_t f = 0; f < near.size(); ++f) {
+      const FoundEffect& found = diagnosis.effects[f];
+      const auto& names = effect->near;
+      if (std::find(names.begin(), names.end(), found.id) == names.end()) continue;
+      if (!covers_axes(truth[t], found.axes)) continue;
+      if (found.id.starts_with("covariate:") &&
+          form_of(found) != sim::find_effect(truth[t].id)->form)
+        continue;
+      by_name = near[f] = true;
+    }
+    outcome.driver_right += by_driver || by_name ? 1 : 0;
+    outcome.near_name += by_name && !by_driver ? 1 : 0;
   }
-  if (!any_listed && !design.effects.empty())
-    outcome.listed_instead = static_cast<int>(diagnosis.effects.size());
-  outcome.wrong += std::max(0, outcome.unlisted - outcome.driver_right);
+  const auto near_names = static_cast<int>(std::count(near.begin(), near.end(), true));
+  outcome.wrong += static_cast<int>(std::count(right.begin(), right.end(), false)) - near_names;
+  if (!any_listed && !truth.empty())
+    outcome.listed_instead = static_cast<int>(diagnosis.effects.size()) - near_names;
 }
 
 void check_parameters(const std::vector<sim::EffectSetting>& truth, const Diagnosis& diagnosis,
@@ -182,6 +208,11 @@ void check_twelve(const StudySet& set, const Calibration& calibration, SetOutcom
   }
 }
 
+/// Root mean square over the fresh poses that count, which are the last of `all` poses.
+double fresh_rms(const StudySet& set, const Eigen::VectorXd& all) {
+  return rms(all.tail(std::ssize(set.set.verification.poses) - 1));
+}
+
 void score_oracle(const StudySet& set, SetOutcome& outcome) {
   const auto poses = pose_means(set.plain.run);
   const auto fresh = pose_means(set.plain.verification);
@@ -195,9 +226,10 @@ void score_oracle(const StudySet& set, SetOutcome& outcome) {
     const auto fit = fit_generalised(A, y, set.covariance_V2[i]);
     assert(fit);
     const double factor = input_referred_mps2_per_V(fit->estimate, i);
-    fresh_mps2[i] = rms(factor * (mean_voltages(fresh, i) - A_fresh * fit->estimate.value));
+    const Eigen::VectorXd y_fresh = mean_voltages(fresh, i);
+    fresh_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * fit->estimate.value));
     const Eigen::VectorXd ordinary = solve_least_squares(A, y).x;
-    ordinary_mps2[i] = rms(factor * (mean_voltages(fresh, i) - A_fresh * ordinary));
+    ordinary_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * ordinary));
     Eigen::VectorXd heldout(2 * y.size());
     heldout << heldout_residuals_V(A, y, set.covariance_V2[i], time_blocks(poses)),
         heldout_residuals_V(A, y, set.covariance_V2[i], position_blocks(poses));
@@ -205,6 +237,27 @@ void score_oracle(const StudySet& set, SetOutcome& outcome) {
   }
   outcome.oracle = {over_axes(fresh_mps2), over_axes(heldout_mps2)};
   outcome.plain_oracle_fresh = over_axes(ordinary_mps2);
+}
+
+/// Errors of the 12 parameters and of the certified model on the fresh poses of the session.
+void score_fresh(const StudySet& set, const CertifiedModel& model, SetOutcome& outcome) {
+  const MeasurementSet all = session(set);
+  const auto poses = pose_means(all);
+  const Eigen::MatrixXd A = design_matrix(poses, set.set.description.gravity);
+  const VisitLog log = make_visit_log(all, set.set.description);
+  std::vector<std::shared_ptr<const Effect>> owned;
+  const auto predicted_V = predict_means_V(log, restore_model(model, log, owned));
+  PerAxis<double> before_mps2{};
+  PerAxis<double> after_mps2{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const Eigen::VectorXd y = mean_voltages(poses, i);
+    before_mps2[i] = fresh_rms(
+        set, input_referred_mps2_per_V(model.twelve[i], i) * (y - A * model.twelve[i].value));
+    after_mps2[i] =
+        fresh_rms(set, input_referred_mps2_per_V(model.final[i], i) * (y - predicted_V[i]));
+  }
+  outcome.before.fresh = over_axes(before_mps2);
+  outcome.after.fresh = over_axes(after_mps2);
 }
 
 std::string describe_truth(const std::vector<sim::EffectSetting>& effects) {
@@ -238,14 +291,48 @@ std::string describe_found(const Diagnosis& diagnosis) {
 
 }  // namespace
 
+double over_axes(const PerAxis<double>& rms_mps2) {
+  double sum = 0;
+  for (const double value : rms_mps2) sum += value * value;
+  return std::sqrt(sum / kAxisCount);
+}
+
+MeasurementSet session(const StudySet& set) {
+  MeasurementSet all = set.set.run;
+  const MeasurementSet& fresh = set.set.verification;
+  const auto append = [](std::vector<double>& to, const std::vector<double>& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  for (Pose pose : fresh.poses) {
+    pose.number = std::ssize(all.poses);
+    pose.first += set.set.run.samples.size();
+    all.poses.push_back(pose);
+  }
+  append(all.samples.t_s, fresh.samples.t_s);
+  for (std::size_t i = 0; i < kAxisCount; ++i) append(all.samples.u_V[i], fresh.samples.u_V[i]);
+  append(all.samples.temp_C, fresh.samples.temp_C);
+  for (std::size_t c = 0; c < all.samples.covariates.size(); ++c)
+    append(all.samples.covariates[c].value, fresh.samples.covariates[c].value);
+  return all;
+}
+
+Claims check_claims(const SetDesign& design, const StudySet& set, const Diagnosis& diagnosis) {
+  Claims claims;
+  claims.found = describe_found(diagnosis);
+  claims.effects = static_cast<int>(set.effects.size());
+  match(set.effects, diagnosis, claims);
+  match_drivers(design, set.effects, diagnosis, claims);
+  return claims;
+}
+
 SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration& calibration) {
   SetOutcome outcome;
+  static_cast<Claims&>(outcome) = check_claims(design, set, calibration.diagnosis);
   outcome.design = design;
   outcome.feasible = set.feasible;
   outcome.truth = describe_truth(set.effects);
   outcome.size = set.size;
   outcome.sigma = set.sigma;
-  outcome.found = describe_found(calibration.diagnosis);
   outcome.verdict = calibration.diagnosis.verdict;
   outcome.p_value = calibration.diagnosis.p_value;
   for (const FoundEffect& effect : calibration.diagnosis.effects)
@@ -253,20 +340,17 @@ SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration
   for (const UnlistedStructure& found : calibration.diagnosis.unlisted)
     outcome.heldout_gain = std::max(outcome.heldout_gain, found.heldout_gain);
 
-  outcome.effects = static_cast<int>(set.effects.size());
-  match(set.effects, calibration.diagnosis, outcome);
-  match_drivers(design, calibration.diagnosis, outcome);
   check_parameters(set.effects, calibration.diagnosis, outcome);
   check_twelve(set, calibration, outcome);
   score_oracle(set, outcome);
 
   const CertifiedModel model{calibration.estimates.batch_ls, calibration.final.batch_ls,
                              calibration.diagnosis.effects, calibration.diagnosis.unlisted};
-  const Evaluation fresh = evaluate(model, set.set.verification, set.set.description);
-  outcome.before = {over_axes(fresh.before.pose_rms_mps2),
-                    over_axes(calibration.before.heldout_pose_rms_mps2)};
-  outcome.after = {over_axes(fresh.after.pose_rms_mps2),
-                   over_axes(calibration.after.heldout_pose_rms_mps2)};
+  outcome.before.heldout = over_axes(calibration.before.heldout_pose_rms_mps2);
+  outcome.after.heldout = over_axes(calibration.after.heldout_pose_rms_mps2);
+  score_fresh(set, model, outcome);
+  outcome.evaluated_fresh =
+      over_axes(evaluate(model, set.set.verification, set.set.description).after.pose_rms_mps2);
   return outcome;
 }
 
@@ -289,6 +373,9 @@ SetOutcome run_set(const SetDesign& design) {
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   SetOutcome outcome = score(design, set, calibration);
   outcome.seconds = seconds;
+  const NaiveResult naive = search_naively(set);
+  outcome.naive = check_claims(design, set, naive.diagnosis);
+  outcome.naive_fresh = naive.fresh_mps2;
   return outcome;
 }
 

@@ -327,6 +327,15 @@ const char* to_string(sim::RecordOrder order) {
   return "random";
 }
 
+NoiseKind noise_of(const std::string& name) {
+  if (name == "white") return NoiseKind::white;
+  return name == "coloured" ? NoiseKind::coloured : NoiseKind::examples;
+}
+sim::RecordOrder order_of(const std::string& name) {
+  if (name == "raster") return sim::RecordOrder::raster;
+  return name == "random" ? sim::RecordOrder::random : sim::RecordOrder::snake;
+}
+
 sim::World study_world(const SetDesign& design) {
   sim::World world;
   world.serial = fmt::format("STUDY-{}", design.seed);
@@ -387,7 +396,8 @@ StudySet make_set(const SetDesign& design) {
   still.plan = {{sim::VisitKind::soak, 0, 0, samples, std::nullopt}};
   sim::World other_day = result.world;
   std::erase_if(other_day.effects, [](const sim::EffectSetting& effect) {
-    return effect.id == "sensor.bias_step" || effect.id == "sensor.warmup";  // of this run only
+    return effect.id == "sensor.bias_step" || effect.id == "sensor.warmup" ||
+           effect.id == "own.floor_tilt" || effect.id == "own.compressor";  // of this run only
   });
   result.static_record = sim::record_set(other_day, still).soak;
   return result;

@@ -4,9 +4,13 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <chrono>
 #include <fstream>
 #include <iostream>
+#include <iterator>
+#include <map>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "estimator/parallel_for.h"
@@ -30,17 +34,10 @@ struct Options {
   std::uint64_t seed = 1;
   int threads = 1;
   double detectable = 8;
-  std::string csv, summary_file, dump_folder;
+  double minutes = 0;  ///< 0: no end
+  std::string csv, tables_file, dump_folder;
+  std::vector<std::string> summed;
 };
-
-sim::RecordOrder order_of(const std::string& name) {
-  if (name == "raster") return sim::RecordOrder::raster;
-  return name == "random" ? sim::RecordOrder::random : sim::RecordOrder::snake;
-}
-NoiseKind noise_of(const std::string& name) {
-  if (name == "white") return NoiseKind::white;
-  return name == "coloured" ? NoiseKind::coloured : NoiseKind::examples;
-}
 
 /// One value of each list, drawn by streams of their own: a shorter list leaves the others' draws.
 SetDesign draw_design(const Options& o, std::uint64_t seed, std::vector<std::string> effects,
@@ -60,16 +57,6 @@ SetDesign draw_design(const Options& o, std::uint64_t seed, std::vector<std::str
   return design;
 }
 
-std::vector<std::string> parts(const std::string& names) {
-  std::vector<std::string> list;
-  for (std::size_t from = 0; from <= names.size();) {
-    const std::size_t to = std::min(names.find('+', from), names.size());
-    list.push_back(names.substr(from, to - from));
-    from = to + 1;
-  }
-  return list;
-}
-
 std::vector<SetDesign> clean_designs(const Options& o) {
   std::vector<SetDesign> designs;
   for (int k = 0; k < o.sets; ++k)
@@ -83,9 +70,8 @@ std::vector<SetDesign> single_designs(const Options& o, const std::vector<std::s
   for (int k = 0; k < o.sets; ++k) {
     for (const std::string& names : effects) {
       for (const double size : o.sizes) {
-        designs.push_back(draw_design(o, o.seed + static_cast<std::uint64_t>(k),
-                                      names == "none" ? std::vector<std::string>{} : parts(names),
-                                      size));
+        designs.push_back(
+            draw_design(o, o.seed + static_cast<std::uint64_t>(k), effect_parts(names), size));
       }
     }
   }
@@ -109,6 +95,28 @@ std::vector<SetDesign> multiple_designs(const Options& o) {
   return designs;
 }
 
+/// Everything, in turns, so that a study that is stopped early has something of all.
+std::vector<SetDesign> all_designs(const Options& o) {
+  std::vector<SetDesign> designs;
+  for (int k = 0; k < o.sets; ++k) {
+    Options turn = o;
+    turn.seed = o.seed + static_cast<std::uint64_t>(k);
+    turn.sets = 1;
+    const auto add = [&](const std::vector<SetDesign>& more) {
+      designs.insert(designs.end(), more.begin(), more.end());
+    };
+    add(single_designs(turn, effect_names(true)));
+    add(single_designs(turn, effect_names(false)));
+    // 25 without effect and 5 with two and with three for each of the others' 20.
+    turn.seed = o.seed + 25 * static_cast<std::uint64_t>(k);
+    turn.sets = 25;
+    add(clean_designs(turn));
+    turn.sets = 5;
+    for (turn.count = 2; turn.count <= 3; ++turn.count) add(multiple_designs(turn));
+  }
+  return designs;
+}
+
 std::string short_line(const SetOutcome& o) {
   return fmt::format("seed {} {} x{} {} {} {} bits: {} named {}/{} stated {} wrong {}; {}\n",
                      o.design.seed, fmt::join(o.design.effects, "+"), o.design.size,
@@ -117,24 +125,55 @@ std::string short_line(const SetOutcome& o) {
                      o.effects, o.named_or_stated + o.driver_right, o.wrong, o.found);
 }
 
-std::vector<SetOutcome> run_all(const Options& o, const std::vector<SetDesign>& designs) {
-  std::vector<SetOutcome> outcomes(designs.size());
-  std::atomic<std::size_t> next = 0;
-  std::size_t done = 0;
-  std::mutex printing;
+std::optional<std::string> text_of(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) return std::nullopt;
+  return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+/// What an earlier piece has left in the file, which afterwards ends with a whole line.
+Result<std::vector<SetOutcome>> resume(const std::string& file) {
+  std::string text = text_of(file).value_or("");
+  text.resize(text.rfind('\n') + 1);
+  const auto earlier = read_csv(text, file);
+  if (!earlier) return earlier;
+  std::ofstream(file, std::ios::binary) << (text.empty() ? csv_header() : text);
+  return earlier;
+}
+
+/// Outcomes of the designs as far as the time allows, earlier ones of the same file included.
+Result<std::vector<SetOutcome>> run_all(const Options& o, std::vector<SetDesign> designs) {
+  std::vector<SetOutcome> outcomes;
   std::ofstream csv;
   if (!o.csv.empty()) {
-    csv.open(o.csv);
-    csv << csv_header();
+    const auto earlier = resume(o.csv);
+    if (!earlier) return earlier;
+    std::map<std::string, const SetOutcome*> done;
+    for (const SetOutcome& outcome : *earlier) done[reproduce(outcome.design)] = &outcome;
+    std::erase_if(designs, [&](const SetDesign& design) {
+      const auto found = done.find(reproduce(design));
+      if (found != done.end()) outcomes.push_back(*found->second);
+      return found != done.end();
+    });
+    csv.open(o.csv, std::ios::app);
   }
+  std::atomic<std::size_t> next = 0;
+  std::size_t done = 0;
+  std::mutex writing;
+  const auto start = std::chrono::steady_clock::now();
+  const auto in_time = [&] {
+    return o.minutes <= 0 ||
+           std::chrono::steady_clock::now() - start < std::chrono::duration<double>(60 * o.minutes);
+  };
   const auto work = [&] {
     const SerialScope one_thread_a_set;
-    for (std::size_t k = next++; k < designs.size(); k = next++) {
-      outcomes[k] = run_set(designs[k]);
-      const std::scoped_lock lock(printing);
+    for (std::size_t k = next++; k < designs.size() && in_time(); k = next++) {
+      SetOutcome outcome = run_set(designs[k]);
+      const std::scoped_lock lock(writing);
       ++done;
-      std::cerr << fmt::format("{}/{} ", done, designs.size()) << short_line(outcomes[k]);
-      if (csv) csv << csv_row(outcomes[k]) << std::flush;
+      std::cerr << fmt::format("{}/{} ", done, designs.size()) << short_line(outcome);
+      if (csv) csv << csv_row(outcome) << std::flush;
+      outcomes.push_back(std::move(outcome));
     }
   };
   {
@@ -143,6 +182,32 @@ std::vector<SetOutcome> run_all(const Options& o, const std::vector<SetDesign>& 
     work();
   }
   return outcomes;
+}
+
+int report(const Options& o, const std::vector<SetOutcome>& outcomes) {
+  const std::string text = summary(outcomes, o.detectable);
+  std::cout << text;
+  if (!o.tables_file.empty()) std::ofstream(o.tables_file) << text;
+  return 0;
+}
+
+/// Tables over the rows of earlier pieces.
+int sum_up(const Options& o) {
+  std::vector<SetOutcome> outcomes;
+  for (const std::string& file : o.summed) {
+    const auto text = text_of(file);
+    if (!text) {
+      std::cerr << file << ": cannot be read\n";
+      return 2;
+    }
+    const auto rows = read_csv(*text, file);
+    if (!rows) {
+      std::cerr << rows.error().message << "\n";
+      return 2;
+    }
+    outcomes.insert(outcomes.end(), rows->begin(), rows->end());
+  }
+  return report(o, outcomes);
 }
 
 int run(const Options& o, const std::vector<SetDesign>& designs) {
@@ -163,11 +228,12 @@ int run(const Options& o, const std::vector<SetDesign>& designs) {
       }
     }
   }
-  const std::vector<SetOutcome> outcomes = run_all(o, designs);
-  const std::string text = summary(outcomes, o.detectable);
-  std::cout << text;
-  if (!o.summary_file.empty()) std::ofstream(o.summary_file) << text;
-  return 0;
+  const auto outcomes = run_all(o, designs);
+  if (!outcomes) {
+    std::cerr << outcomes.error().message << "\n";
+    return 2;
+  }
+  return report(o, *outcomes);
 }
 
 }  // namespace
@@ -176,7 +242,7 @@ int main(int argc, char** argv) {
   Options o;
   o.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   CLI::App app{"Does the diagnosis name what is there, and nothing else?"};
-  app.require_subcommand(1);
+  app.require_subcommand(0, 1);
   app.fallthrough();
   app.add_option("--sets", o.sets, "sets per effect and size, or in all (clean, multiple)")
       ->check(CLI::Range(1, 1000000))
@@ -206,23 +272,32 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--detectable", o.detectable, "weaker effects, in sigma, count as not detectable")
       ->capture_default_str();
-  app.add_option("--csv", o.csv, "file for one row per set");
-  app.add_option("--summary", o.summary_file, "file for the tables");
+  app.add_option("--csv", o.csv,
+                 "file for one row per set; what is in it already is not done again");
+  app.add_option("--minutes", o.minutes, "start no further set after that time; 0: do all")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--summary", o.summed, "only the tables over these files of rows")
+      ->check(CLI::ExistingFile);
+  app.add_option("--tables", o.tables_file, "file for the tables");
   app.add_option("--dump", o.dump_folder, "folder for the sets as files");
   const auto* clean = app.add_subcommand("clean", "sets without any effect");
   const auto* single = app.add_subcommand("single", "one listed effect (or those of --effects)");
   const auto* multiple = app.add_subcommand("multiple", "several listed effects at once");
   app.add_option("--count", o.count, "effects at once (multiple)")->capture_default_str();
   const auto* own = app.add_subcommand("own", "one effect that is on no list");
+  const auto* everything = app.add_subcommand("all", "all of these in turns, for a night");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+  if (!o.summed.empty()) return sum_up(o);
+  if (everything->parsed()) return run(o, all_designs(o));
   if (clean->parsed()) return run(o, clean_designs(o));
   if (multiple->parsed()) return run(o, multiple_designs(o));
   const auto all = effect_names(!own->parsed());
   if (single->parsed() || own->parsed())
     return run(o, single_designs(o, o.effects.empty() ? all : o.effects));
+  std::cerr << "one of clean, single, multiple, own, all or --summary is needed\n";
   return 2;
 }

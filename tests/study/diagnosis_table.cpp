@@ -1,37 +1,35 @@
-// CSV rows and tables of the diagnosis study.
+// Tables of the diagnosis study.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
+#include <map>
 
 #include "tests/study/diagnosis.h"
 
 namespace plumbline::study {
 namespace {
 
-/// Ends of Wilson's interval: the shares whose own binomial distribution has k/n at ±z.
-double wilson(const Share& share, double sign) {
-  if (share.n == 0) return sign < 0 ? 0 : 1;
-  constexpr double kZ = 1.959964;
-  const double n = share.n;
-  const double p = share.value();
-  const double centre = p + kZ * kZ / (2 * n);
-  const double half = kZ * std::sqrt(p * (1 - p) / n + kZ * kZ / (4 * n * n));
-  return std::clamp((centre + sign * half) / (1 + kZ * kZ / n), 0.0, 1.0);
+/// P(X ≥ k) of n trials that each succeed with probability p.
+double at_least(int k, int n, double p) {
+  double sum = 0;
+  for (int j = k; j <= n; ++j) {
+    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(j + 1.0) - std::lgamma(n - j + 1.0) +
+                    j * std::log(p) + (n - j) * std::log1p(-p));
+  }
+  return sum;
 }
 
-std::string reproduce(const SetDesign& d) {
-  return fmt::format(
-      "single --effects {} --sizes {} --orders {} --noises {} --bits {} --samples {} --static {} "
-      "--sets 1 --seed {}",
-      d.effects.empty() ? "none" : fmt::format("{}", fmt::join(d.effects, "+")), d.size,
-      to_string(d.order), to_string(d.noise), d.bits, d.samples_per_pose, d.static_s, d.seed);
-}
-
-std::string numbers(const std::vector<double>& values) {
-  std::string text;
-  for (const double value : values) text += fmt::format("{}{:.2f}", text.empty() ? "" : "+", value);
-  return text;
+/// The p at which k or more of n have this probability.
+double p_where(int k, int n, double probability) {
+  double low = 0, high = 1;
+  for (int step = 0; step < 50; ++step) {
+    const double middle = 0.5 * (low + high);
+    (at_least(k, n, middle) < probability ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
 }
 
 double quantile(std::vector<double> values, double q) {
@@ -41,37 +39,71 @@ double quantile(std::vector<double> values, double q) {
   return values[at];
 }
 
-std::string share_text(const Share& s) {
-  if (s.n == 0) return fmt::format("{:>26}", "-");
-  return fmt::format("{:>6.1f} % [{:>5.1f} {:>5.1f}] {:>4}", 100 * s.value(), 100 * s.lower(),
-                     100 * s.upper(), s.n);
+/// "19/20 [ 75  99]": count and 95 % limits in per cent.
+std::string cell(const Share& s) {
+  if (s.n == 0) return fmt::format("{:>18}", "-");
+  return fmt::format("{:>4}/{:<4}[{:>3.0f} {:>3.0f}]", s.k, s.n, 100 * s.lower(), 100 * s.upper());
 }
+std::string long_cell(const Share& s) {
+  if (s.n == 0) return fmt::format("{:>32}", "-");
+  return fmt::format("{:>6.1f} % [{:>5.1f} {:>5.1f}] {:>4}/{:<4}", 100 * s.value(), 100 * s.lower(),
+                     100 * s.upper(), s.k, s.n);
+}
+/// Median and worst of ratios.
+std::string cell(const std::vector<double>& ratios) {
+  return fmt::format("{:>6.3f} {:>6.3f}", quantile(ratios, 0.5), quantile(ratios, 1));
+}
+
+void count(Share& share, bool yes) {
+  share.k += yes ? 1 : 0;
+  ++share.n;
+}
+
+/// What one way of searching shows over a group of sets.
+struct Score {
+  Share any, named, stated, wrong, additional, unlisted_instead, driver, not_listed;
+  std::vector<double> fresh;
+  int near_name = 0;
+
+  void add(const Claims& c, double fresh_to_oracle) {
+    count(any, c.any());
+    count(additional, c.additional() > 0);
+    fresh.push_back(fresh_to_oracle);
+  }
+  void add_detectable(const Claims& c, bool outside) {
+    count(named, c.named == c.effects);
+    count(stated, c.named_or_stated + c.driver_right == c.effects);
+    count(wrong, c.wrong > 0);
+    count(unlisted_instead, c.missed() > 0 && c.unlisted > 0);
+    if (!outside) return;
+    count(driver, c.driver_right > 0);
+    count(not_listed, c.listed_instead == 0);
+    near_name += c.near_name;
+  }
+};
 
 /// All that a group of sets shows.
 struct Tally {
-  Share named, stated, additional, wrong, unlisted_instead, driver, not_listed, coverage, K, U0,
-      found_any, unexplained, worse;
-  std::vector<double> fresh, heldout, seconds;
-  int infeasible = 0, undetectable = 0;
+  Score ours, naive;
+  Share coverage, K, U0, unexplained, worse;
+  std::vector<double> heldout, evaluated, seconds;
+  std::map<std::string, int> claims;  ///< how often what was reported, for effects outside the list
+  int sets = 0, infeasible = 0, undetectable = 0;
 
   void add(const SetOutcome& o, double detectable_sigma) {
+    ++sets;
     if (!o.feasible) {
       ++infeasible;
       return;
     }
-    const auto yes_no = [](Share& share, bool yes) {
-      share.k += yes ? 1 : 0;
-      ++share.n;
-    };
-    yes_no(additional, o.additional() > 0);
-    yes_no(found_any, o.wrong + o.named_or_stated + o.driver_right > 0);
-    yes_no(unexplained,
-           o.verdict == Verdict::unexplained || o.verdict == Verdict::partly_explained);
-    yes_no(worse,
-           o.after.fresh > 1.02 * o.before.fresh || o.after.heldout > 1.02 * o.before.heldout);
+    ours.add(o, o.after.fresh / o.oracle.fresh);
+    naive.add(o.naive, o.naive_fresh / o.oracle.fresh);
+    count(unexplained, o.verdict == Verdict::unexplained || o.verdict == Verdict::partly_explained);
+    count(worse,
+          o.after.fresh > 1.02 * o.before.fresh || o.after.heldout > 1.02 * o.before.heldout);
     seconds.push_back(o.seconds);
-    fresh.push_back(o.after.fresh / o.oracle.fresh);
     heldout.push_back(o.after.heldout / o.oracle.heldout);
+    evaluated.push_back(o.evaluated_fresh / o.oracle.fresh);
     coverage.k += o.parameters_within;
     coverage.n += o.parameters;
     K.k += o.K_within;
@@ -79,118 +111,164 @@ struct Tally {
     U0.k += o.U0_within;
     U0.n += 3;
     if (o.effects == 0) return;
-    const bool detectable = std::all_of(o.sigma.begin(), o.sigma.end(),
-                                        [&](double s) { return s >= detectable_sigma; });
-    if (!detectable) {
+    if (std::any_of(o.sigma.begin(), o.sigma.end(),
+                    [&](double s) { return s < detectable_sigma; })) {
       ++undetectable;
       return;
     }
-    yes_no(named, o.named == o.effects);
-    yes_no(stated, o.named_or_stated + o.driver_right == o.effects);
-    yes_no(wrong, o.wrong > 0);
-    yes_no(unlisted_instead, o.missed() > 0 && o.unlisted > 0);
-    const bool outside = std::all_of(
-        o.design.effects.begin(), o.design.effects.end(),
-        [](const std::string& name) { return !find_study_effect(name)->drivers.empty(); });
-    if (!outside) return;
-    yes_no(driver, o.driver_right > 0);
-    yes_no(not_listed, o.listed_instead == 0);
+    const bool outside = kind_of(o.design) == SetKind::own;
+    ours.add_detectable(o, outside);
+    naive.add_detectable(o.naive, outside);
+    if (outside) ++claims[claim(o.found)];
+  }
+
+ private:
+  /// Ids and drivers without numbers.
+  static std::string claim(const std::string& found) {
+    std::string text;
+    for (std::size_t from = 0; from < found.size();) {
+      const std::size_t to = std::min(found.find("; ", from), found.size());
+      const std::string one = found.substr(from, to - from);
+      text += (text.empty() ? "" : "+") + one.substr(0, one.find('('));
+      from = to + 2;
+    }
+    return text.empty() ? "nothing" : text;
   }
 };
 
-std::string joined_name(const SetDesign& d) {
-  return d.effects.empty() ? "none" : fmt::format("{}", fmt::join(d.effects, "+"));
+using Rows = std::vector<std::pair<std::string, Tally>>;  // in the order of first appearance
+using Key = std::function<std::string(const SetDesign&)>;
+
+Rows rows_by(const std::vector<SetOutcome>& outcomes, double detectable_sigma, const Key& key) {
+  Rows rows;
+  for (const SetOutcome& o : outcomes) {
+    const std::string name = key(o.design);
+    auto at = std::find_if(rows.begin(), rows.end(), [&](auto& r) { return r.first == name; });
+    if (at == rows.end()) at = rows.insert(rows.end(), {name, {}});
+    at->second.add(o, detectable_sigma);
+  }
+  return rows;
 }
 
-}  // namespace
-
-double Share::lower() const { return wilson(*this, -1); }
-double Share::upper() const { return wilson(*this, 1); }
-
-std::string csv_header() {
-  return "seed,effects,size,order,noise,bits,samples,static_s,feasible,sigma,verdict,p_value,"
-         "named,named_or_stated,wrong,additional,unlisted,driver_right,listed_instead,"
-         "heldout_gain,parameters,parameters_within,K_within,U0_within,worst_K,worst_U0,before_"
-         "fresh_mps2,"
-         "after_fresh_mps2,oracle_fresh_mps2,ordinary_oracle_fresh_mps2,before_heldout_mps2,"
-         "after_heldout_mps2,oracle_heldout_mps2,seconds,truth,found,reproduce\n";
+/// Rates with their 95 % limits in per cent; errors as median and worst ratio to the oracle's.
+std::string table(const std::string& title, const Rows& rows) {
+  std::string text = fmt::format(
+      "\n{:<32}{:>4} {:>4} {:>4} |{:^18}{:^18}{:^18}|{:^13}|{:^13}|| naive:{:^18}{:^18}{:^13}\n",
+      title, "sets", "inf.", "weak", "named", "or stated", "additional", "fresh", "left out",
+      "named", "additional", "fresh");
+  for (const auto& [name, t] : rows) {
+    text += fmt::format("{:<32}{:>4} {:>4} {:>4} |{}{}{}|{}|{}||       {}{}{}\n", name, t.sets,
+                        t.infeasible, t.undetectable, cell(t.ours.named), cell(t.ours.stated),
+                        cell(t.ours.additional), cell(t.ours.fresh), cell(t.heldout),
+                        cell(t.naive.named), cell(t.naive.additional), cell(t.naive.fresh));
+  }
+  return text;
 }
 
-std::string csv_row(const SetOutcome& o) {
-  const SetDesign& d = o.design;
-  return fmt::format(
-      "{},{},{},{},{},{},{},{},{},{},{},{:.3g},{},{},{},{},{},{},{},{:.4f},{},{},{},{},{:.2f},{:."
-      "2f},{:.6f},"
-      "{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.2f},\"{}\",\"{}\",\"{}\"\n",
-      d.seed, joined_name(d), d.size, to_string(d.order), to_string(d.noise), d.bits,
-      d.samples_per_pose, d.static_s, o.feasible ? 1 : 0, numbers(o.sigma), to_string(o.verdict),
-      o.p_value, o.named, o.named_or_stated, o.wrong, o.additional(), o.unlisted, o.driver_right,
-      o.listed_instead, o.heldout_gain, o.parameters, o.parameters_within, o.K_within, o.U0_within,
-      o.worst_K, o.worst_U0, o.before.fresh, o.after.fresh, o.oracle.fresh, o.plain_oracle_fresh,
-      o.before.heldout, o.after.heldout, o.oracle.heldout, o.seconds, o.truth, o.found,
-      reproduce(d));
+/// Effects outside the list: rates, then how often what was reported.
+std::string own_table(const std::string& title, const Rows& rows) {
+  std::string text = fmt::format(
+      "\n{:<32}{:>4} {:>4} {:>4} |{:^18}{:>5} {:^18}|{:^13}|{:^13}|| naive:{:^18}{:^18}{:^13}\n",
+      title, "sets", "inf.", "weak", "right driver", "near", "none instead", "fresh", "left out",
+      "right driver", "none instead", "fresh");
+  for (const auto& [name, t] : rows) {
+    text += fmt::format("{:<32}{:>4} {:>4} {:>4} |{}{:>5} {}|{}|{}||       {}{}{}\n", name, t.sets,
+                        t.infeasible, t.undetectable, cell(t.ours.driver), t.ours.near_name,
+                        cell(t.ours.not_listed), cell(t.ours.fresh), cell(t.heldout),
+                        cell(t.naive.driver), cell(t.naive.not_listed), cell(t.naive.fresh));
+    for (const auto& [claim, times] : t.claims) text += fmt::format("{:>10} x {}\n", times, claim);
+  }
+  return text;
 }
 
-std::string summary(const std::vector<SetOutcome>& outcomes, double detectable_sigma) {
-  const auto row = [](const std::string& name, const Tally& t) {
-    return fmt::format(
-        "{:<28}{:>5}{:>5}{:>5} | {:>3}/{:<3} {:>3}/{:<3} {:>4} {:>4} {:>4} | {:>5.3f} {:>5.3f} | "
-        "{:>5.3f} {:>5.3f}\n",
-        name, t.found_any.n, t.infeasible, t.undetectable, t.named.k, t.named.n, t.stated.k,
-        t.stated.n, t.wrong.k, t.additional.k, t.unlisted_instead.k, quantile(t.fresh, 0.5),
-        quantile(t.fresh, 1), quantile(t.heldout, 0.5), quantile(t.heldout, 1));
+std::string totals(const Tally& all, double detectable_sigma) {
+  std::string text = fmt::format(
+      "\n{} sets, {} not feasible, {} with an effect of less than {} sigma\n{:<52}{:^32}  {:^32}\n",
+      all.sets, all.infeasible, all.undetectable, detectable_sigma, "share [95 % limits] sets",
+      "ours", "naive");
+  const auto both = [&](const char* name, Share Score::*share) {
+    if ((all.ours.*share).n == 0) return;
+    text += fmt::format("{:<52}{}  {}\n", name, long_cell(all.ours.*share),
+                        long_cell(all.naive.*share));
   };
-  const auto table = [&](const std::string& title, auto key) {
-    std::vector<std::pair<std::string, Tally>> rows;  // in the order of first appearance
-    for (const SetOutcome& o : outcomes) {
-      const std::string name = key(o.design);
-      auto at = std::find_if(rows.begin(), rows.end(), [&](auto& r) { return r.first == name; });
-      if (at == rows.end()) at = rows.insert(rows.end(), {name, {}});
-      at->second.add(o, detectable_sigma);
-    }
-    std::string text = "\n" + title + "\n";
-    text += fmt::format("{:<28}{:>5}{:>5}{:>5} | {:<7} {:<7} {:>4} {:>4} {:>4} | {:<11} | {:<11}\n",
-                        "", "sets", "inf.", "weak", "named", "stated", "wrng", "add.", "unl.",
-                        "fresh med/max", "heldout med/max");
-    for (const auto& [name, tally] : rows) text += row(name, tally);
-    return text;
-  };
-  std::string text = table("by effect", [](const SetDesign& d) { return joined_name(d); });
-  text += table("by effect and size",
-                [](const SetDesign& d) { return fmt::format("{} x{}", joined_name(d), d.size); });
-  text += table("by noise", [](const SetDesign& d) { return std::string(to_string(d.noise)); });
-  text += table("by order", [](const SetDesign& d) { return std::string(to_string(d.order)); });
-  text += table("by bits", [](const SetDesign& d) { return fmt::format("{} bits", d.bits); });
-
-  Tally all;
-  for (const SetOutcome& o : outcomes) all.add(o, detectable_sigma);
   const auto line = [&](const char* name, const Share& share) {
-    text += fmt::format("{:<52}{}\n", name, share_text(share));
+    if (share.n > 0) text += fmt::format("{:<52}{}\n", name, long_cell(share));
   };
-  text += fmt::format(
-      "\n{} sets, {} not feasible, {} with an effect of less than {} sigma       "
-      "share  [95 % limits]    n\n",
-      outcomes.size(), all.infeasible, all.undetectable, detectable_sigma);
-  line("an effect or a structure claimed", all.found_any);
+  both("an effect or a structure claimed", &Score::any);
+  both("named right (id and axes)", &Score::named);
+  both("named right or among the stated, or driver right", &Score::stated);
+  both("a wrong finding", &Score::wrong);
+  both("findings beyond the true ones, all sets", &Score::additional);
+  both("missed, unlisted structure instead", &Score::unlisted_instead);
+  both("effects outside the list: a right driver", &Score::driver);
+  both("effects outside the list: no listed name", &Score::not_listed);
   line("left unexplained, wholly or partly", all.unexplained);
-  line("named right (id and axes)", all.named);
-  line("named right or among the stated, or driver right", all.stated);
-  line("a wrong finding", all.wrong);
-  line("findings beyond the true ones, all sets", all.additional);
-  line("missed, unlisted structure instead", all.unlisted_instead);
-  line("effects outside the list: a right driver", all.driver);
-  line("effects outside the list: no listed name", all.not_listed);
   line("effect parameters within 1.96 u", all.coverage);
   line("K within 1.96 u", all.K);
   line("U0 within 1.96 u", all.U0);
   line("error after above 1.02 of before", all.worse);
-  text += fmt::format(
-      "error after / oracle: fresh median {:.3f}, 95 % {:.3f}, worst {:.3f}; left-out median "
-      "{:.3f}, 95 % {:.3f}, worst {:.3f}\n",
-      quantile(all.fresh, 0.5), quantile(all.fresh, 0.95), quantile(all.fresh, 1),
-      quantile(all.heldout, 0.5), quantile(all.heldout, 0.95), quantile(all.heldout, 1));
+  const auto errors = [&](const char* name, const std::vector<double>& ratios) {
+    text += fmt::format("{:<52}median {:.3f}, 95 % {:.3f}, worst {:.3f}\n", name,
+                        quantile(ratios, 0.5), quantile(ratios, 0.95), quantile(ratios, 1));
+  };
+  errors("error after / oracle: fresh poses", all.ours.fresh);
+  errors("  left-out poses", all.heldout);
+  errors("  fresh poses as a file of their own (evaluate)", all.evaluated);
+  errors("  fresh poses, naive", all.naive.fresh);
   text += fmt::format("calibrate(): median {:.2f} s, longest {:.2f} s\n",
                       quantile(all.seconds, 0.5), quantile(all.seconds, 1));
+  return text;
+}
+
+}  // namespace
+
+double Share::lower() const { return k == 0 ? 0 : p_where(k, n, 0.025); }
+double Share::upper() const { return k == n ? 1 : p_where(k + 1, n, 0.975); }
+
+SetKind kind_of(const SetDesign& design) {
+  if (design.effects.empty()) return SetKind::clean;
+  for (const std::string& name : design.effects)
+    if (!find_study_effect(name)->drivers.empty()) return SetKind::own;
+  return design.effects.size() > 1 ? SetKind::multiple : SetKind::single;
+}
+
+std::string summary(const std::vector<SetOutcome>& outcomes, double detectable_sigma) {
+  static constexpr std::pair<SetKind, const char*> kKinds[] = {
+      {SetKind::clean, "No effect"},
+      {SetKind::single, "One listed effect"},
+      {SetKind::multiple, "Several listed effects"},
+      {SetKind::own, "Effects outside the list"}};
+  std::string text;
+  for (const auto& each : kKinds) {
+    const SetKind kind = each.first;
+    std::vector<SetOutcome> these;
+    std::copy_if(outcomes.begin(), outcomes.end(), std::back_inserter(these),
+                 [kind](const SetOutcome& o) { return kind_of(o.design) == kind; });
+    if (these.empty()) continue;
+    text += fmt::format("\n== {} ==\n", each.second);
+    const auto by = [&](const char* name, const Key& key) {
+      const Rows rows = rows_by(these, detectable_sigma, key);
+      text += kind == SetKind::own ? own_table(name, rows) : table(name, rows);
+    };
+    if (kind == SetKind::multiple) {
+      by("by number of effects",
+         [](const SetDesign& d) { return fmt::format("{} effects", d.effects.size()); });
+    } else if (kind != SetKind::clean) {
+      by("by effect", joined_name);
+      by("by size", [](const SetDesign& d) { return fmt::format("x{}", d.size); });
+    }
+    if (kind == SetKind::single)
+      by("by effect and size",
+         [](const SetDesign& d) { return fmt::format("{} x{}", joined_name(d), d.size); });
+    if (kind != SetKind::own) {
+      by("by noise", [](const SetDesign& d) { return std::string(to_string(d.noise)); });
+      by("by order", [](const SetDesign& d) { return std::string(to_string(d.order)); });
+      by("by bits", [](const SetDesign& d) { return fmt::format("{} bits", d.bits); });
+    }
+    Tally all;
+    for (const SetOutcome& o : these) all.add(o, detectable_sigma);
+    text += totals(all, detectable_sigma);
+  }
   return text;
 }
 

@@ -144,13 +144,92 @@ TEST(DiagnosisStudy, ScoresFindingsByHand) {
   EXPECT_EQ(outcome.wrong, 1);
 }
 
-TEST(DiagnosisStudy, WilsonLimitsByHand) {
+TEST(DiagnosisStudy, EffectOutsideTheListIsScoredByItsDriver) {
+  const SetDesign design{.seed = 1, .effects = {"own.condensation"}};
+  const StudySet set = with_truth(design, {{"own.condensation", {1}, {{"b", 0.01}}, {}, "bias"}});
+  Diagnosis diagnosis;
+  UnlistedStructure structure;
+  structure.driver = "rh_pct";
+  structure.axes = {1};
+  diagnosis.unlisted = {structure};
+  Claims claims = check_claims(design, set, diagnosis);
+  EXPECT_EQ(claims.driver_right, 1);
+  EXPECT_EQ(claims.wrong + claims.near_name + claims.listed_instead + claims.missed(), 0);
+
+  // Another axis, another driver; a listed name beside the right driver is one too many.
+  diagnosis.unlisted[0].axes = {0};
+  EXPECT_EQ(check_claims(design, set, diagnosis).driver_right, 0);
+  diagnosis.unlisted[0] = structure;
+  diagnosis.unlisted[0].driver = "t_s";
+  EXPECT_EQ(check_claims(design, set, diagnosis).driver_right, 0);
+  diagnosis.unlisted[0] = structure;
+  diagnosis.effects = {finding("sensor.drift", {1})};
+  claims = check_claims(design, set, diagnosis);
+  EXPECT_EQ(claims.driver_right, 1);
+  EXPECT_EQ(claims.listed_instead, 1);
+  EXPECT_EQ(claims.wrong, 1);
+
+  // The straight part of the curve has the driver in its name; its other form has not.
+  diagnosis.unlisted.clear();
+  diagnosis.effects = {finding("covariate:rh_pct", {1})};
+  diagnosis.effects[0].parameters = {{"c", 1, 0.01, 0, "g/rh_pct"}};
+  claims = check_claims(design, set, diagnosis);
+  EXPECT_EQ(claims.driver_right, 1);
+  EXPECT_EQ(claims.near_name, 1);
+  EXPECT_EQ(claims.wrong + claims.listed_instead, 0);
+  diagnosis.effects[0].parameters[0].unit = "1/rh_pct";
+  claims = check_claims(design, set, diagnosis);
+  EXPECT_EQ(claims.driver_right, 0);
+  EXPECT_EQ(claims.listed_instead, 1);
+}
+
+TEST(DiagnosisStudy, NaiveSearchNamesAnEffectAndSeesMoreThanThereIs) {
+  const StudySet set =
+      make_set({.seed = 11, .effects = {"sensor.quadratic"}, .size = 10, .static_s = 1});
+  const NaiveResult naive = search_naively(set);
+  const Claims claims = check_claims({.effects = {"sensor.quadratic"}}, set, naive.diagnosis);
+  EXPECT_EQ(claims.named_or_stated, 1) << claims.found;
+  EXPECT_GT(claims.wrong, 0) << claims.found;
+  EXPECT_GT(naive.fresh_mps2, 0);
+  EXPECT_LT(naive.fresh_mps2, 0.5);
+}
+
+TEST(DiagnosisStudy, RowsAreReadBackAsTheyWereWritten) {
+  SetOutcome outcome;
+  outcome.design = {.seed = 7,
+                    .effects = {"rig.backlash", "sensor.drift"},
+                    .size = 3,
+                    .order = sim::RecordOrder::random,
+                    .noise = NoiseKind::coloured,
+                    .bits = 12};
+  outcome.size = {3.01, 2.99};
+  outcome.sigma = {40, 41.5};
+  outcome.verdict = Verdict::partly_explained;
+  outcome.found = "sensor.drift(x) d=1, 2; rig.backlash(xyz)";
+  outcome.effects = 2;
+  outcome.named = 1;
+  outcome.after.fresh = 0.0215;
+  outcome.naive.wrong = 3;
+  const std::string text = csv_header() + csv_row(outcome);
+  const auto rows = read_csv(text + "8,rig.back", "rows");  // the last one was cut short
+  ASSERT_TRUE(rows) << rows.error().message;
+  ASSERT_EQ(rows->size(), 1U);
+  EXPECT_EQ(csv_row(rows->front()), csv_row(outcome));
+  EXPECT_EQ(rows->front().found, outcome.found);
+  EXPECT_EQ(reproduce(rows->front().design), reproduce(outcome.design));
+  EXPECT_FALSE(read_csv("seed,effects\n1,none\n", "rows"));
+}
+
+TEST(DiagnosisStudy, ClopperPearsonLimitsByHand) {
   const Share none{0, 500};
-  EXPECT_NEAR(none.lower(), 0, 1e-12);
-  EXPECT_NEAR(none.upper(), 3.8415 / 503.8415, 1e-5);  // z²/(n + z²)
+  EXPECT_EQ(none.lower(), 0);
+  EXPECT_NEAR(none.upper(), 1 - std::pow(0.025, 1.0 / 500), 1e-9);
+  const Share all{20, 20};
+  EXPECT_NEAR(all.lower(), std::pow(0.025, 1.0 / 20), 1e-9);
+  EXPECT_EQ(all.upper(), 1);
   const Share half{50, 100};
-  EXPECT_NEAR(half.lower(), 0.4038, 1e-4);
-  EXPECT_NEAR(half.upper(), 0.5962, 1e-4);
+  EXPECT_NEAR(half.lower(), 0.39832, 1e-5);
+  EXPECT_NEAR(half.upper(), 0.60168, 1e-5);
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ void add_core_data(const Context& c, const XmlElement& parent) {
   if (dates.from.empty()) dates = {issued, issued};
   core.add("dcc:beginPerformanceDate", dates.from);
   core.add("dcc:endPerformanceDate", dates.to);
-  core.add("dcc:performanceLocation", lab.location);
+  core.add("dcc:performanceLocation", lab.location.empty() ? "other" : lab.location);
   core.add("dcc:issueDate", issued);
 }
 
@@ -142,7 +142,9 @@ void add_statements(const Context& c, const XmlElement& parent) {
   for (const std::string& sentence : c.document.summary) {
     add_statement(c, list, "plumbline_summary", sentence);
   }
-  add_traceability(c, list, c.tr("Traceability of the angles"), lab.head);
+  if (c.input.scalar == nullptr) {
+    add_traceability(c, list, c.tr("Traceability of the angles"), lab.head);
+  }
   add_traceability(c, list, c.tr("Traceability of gravity"), lab.gravity);
   if (!lab.ambient.empty()) {
     add_statement(c, list, "plumbline_ambientConditions",
@@ -153,6 +155,10 @@ void add_statements(const Context& c, const XmlElement& parent) {
     add_statement(c, list, "plumbline_datesNotStated",
                   c.tr("The dates of performance were not stated; the day of the evaluation stands "
                        "in their place."));
+  }
+  if (lab.location.empty()) {
+    add_statement(c, list, "plumbline_locationNotStated",
+                  c.tr("The place of calibration was not stated; “other” stands in its place."));
   }
   if (lab.laboratory.country.empty()) {
     add_statement(c, list, "plumbline_countryNotStated",

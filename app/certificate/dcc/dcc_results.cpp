@@ -7,6 +7,7 @@
 #include "app/certificate/dcc/dcc_parts.h"
 #include "app/certificate/dcc/dcc_units.h"
 #include "app/certificate/effect_words.h"
+#include "app/certificate/scalar_results.h"
 #include "app/certificate/sensor_terms.h"
 #include "estimator/decision.h"
 
@@ -86,10 +87,16 @@ XmlElement add_quantity(const Context& c, const XmlElement& data, const char* re
   return quantity;
 }
 
+std::string method_name(const Context& c) {
+  return c.input.scalar != nullptr
+             ? c.tr("scalar calibration from the magnitude of gravity at rest")
+             : c.tr("multipoint tumble test, weighted least squares");
+}
+
 void used_method(const Context& c, const XmlElement& quantity) {
   const XmlElement method = quantity.add("dcc:usedMethods").add("dcc:usedMethod");
   method.attribute("refId", kMethodId);
-  c.text(method, "dcc:name", c.tr("multipoint tumble test, weighted least squares"));
+  c.text(method, "dcc:name", method_name(c));
 }
 
 // --- methods and conditions ----------------------------------------------------------------------
@@ -106,17 +113,17 @@ void add_methods(const Context& c, const XmlElement& parent) {
     if (norm != nullptr) method.add("dcc:norm", norm);
   };
   const Laboratory& lab = c.input.laboratory;
-  add("basic_calibrationMethod", c.tr("multipoint tumble test, weighted least squares"),
+  add("basic_calibrationMethod", method_name(c),
       c.tr("Procedure") + ": " +
           (lab.procedure.empty() ? c.document.words.missing : lab.procedure) + ". " +
           c.tr("Deviations from the procedure") + ": " +
           (lab.deviations.empty() ? c.document.words.missing : lab.deviations),
-      "IEEE Std 1293");
+      c.input.scalar != nullptr ? nullptr : "IEEE Std 1293");
   add("basic_methodMeasurementUncertainty", c.tr("Uncertainty budget"),
       c.tr(
           "Expanded uncertainty with coverage factor k = 2, about 95 % for a normal distribution."),
       "JCGM 100:2008");
-  const Decision& decision = c.input.calibration.decision;
+  const Decision decision = stated_decision(c.input.calibration.decision, c.input.events);
   if (decision.status != DecisionStatus::none) {
     add("plumbline_decisionRule", c.tr("Decision rule"),
         decision.rule.empty() ? "" : c.tr(decision.rule), "ILAC-G8:09/2019");
@@ -203,6 +210,30 @@ void add_parameters(const Context& c, const XmlElement& results) {
                    dcc_ref::kOffset, c.tr("output voltage without specific force"));
   add_list(quantity, offsets);
   used_method(c, quantity);
+}
+
+/// The nine parameters of a calibration without angles.
+void add_scalar(const Context& c, const XmlElement& results) {
+  const ScalarEstimate& estimate = c.input.scalar->calibration.final;
+  const ReadingUnits units = reading_units(c.input.scalar->source.reading_unit);
+  const auto add = [&](const char* ref_type, const std::string& name, Eigen::Index first,
+                       std::vector<std::string> labels, double factor, const std::string& unit) {
+    Series series{std::move(labels), {}, {}, unit};
+    for (Eigen::Index i = first; i < first + 3; ++i) {
+      series.values.push_back(estimate.value(i));
+      series.u.push_back(std::sqrt(std::max(0.0, estimate.covariance(i, i))));
+    }
+    const XmlElement quantity =
+        add_quantity(c, add_result(c, results, ref_type, name), ref_type, name);
+    add_list(quantity, scaled(series, factor, unit));
+    used_method(c, quantity);
+  };
+  add(dcc_ref::kBias, c.tr("Bias of the axes x, y, z"), 0, {"bias_x", "bias_y", "bias_z"},
+      units.factor, units.bias);
+  add(dcc_ref::kScale, c.tr("Scale of the axes x, y, z"), 3, {"scale_x", "scale_y", "scale_z"},
+      1 / units.factor, units.scale);
+  add("plumbline_nonorthogonality", c.tr("Non-orthogonality"), 6,
+      {"angle_yz", "angle_zy", "angle_zx"}, 1, "\\radian");
 }
 
 void add_sensor_terms(const Context& c, const XmlElement& results) {
@@ -310,7 +341,7 @@ void add_errors(const Context& c, const XmlElement& results) {
 }
 
 void add_decision(const Context& c, const XmlElement& results) {
-  const Decision& decision = c.input.calibration.decision;
+  const Decision decision = stated_decision(c.input.calibration.decision, c.input.events);
   if (decision.status == DecisionStatus::none) return;
   const XmlElement quantity = add_quantity(
       c, add_result(c, results, "plumbline_conformity", c.tr("Statement of conformity")),
@@ -326,30 +357,23 @@ void add_decision(const Context& c, const XmlElement& results) {
 }
 
 void add_noise(const Context& c, const XmlElement& results) {
-  struct Term {
-    const char* name;
-    NoiseTerm NoiseModel::*member;
-    const char* unit;
-  };
-  static constexpr Term kTerms[] = {{"Q", &NoiseModel::Q, "\\volt\\second"},
-                                    {"N", &NoiseModel::N, "\\volt\\second\\tothe{0.5}"},
-                                    {"B", &NoiseModel::B, "\\volt"},
-                                    {"K", &NoiseModel::K, "\\volt\\second\\tothe{-0.5}"},
-                                    {"R", &NoiseModel::R, "\\volt\\second\\tothe{-1}"}};
+  static constexpr const char* kUnit[kTermCount] = {"\\volt\\second", "\\volt\\second\\tothe{0.5}",
+                                                    "\\volt", "\\volt\\second\\tothe{-0.5}",
+                                                    "\\volt\\second\\tothe{-1}"};
   const PerAxis<NoiseModel>& noise = c.input.calibration.noise;
   if (std::all_of(noise.begin(), noise.end(), [](const auto& n) { return n.source == "none"; })) {
     return;
   }
   const XmlElement data = add_result(c, results, "plumbline_noise", c.tr("Noise"));
-  for (const Term& term : kTerms) {
-    Series series{{}, {}, {}, term.unit};
+  for (std::size_t term = 0; term < kTermCount; ++term) {
+    Series series{{}, {}, {}, kUnit[term]};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const NoiseTerm& value = noise[i].*term.member;
-      series.labels.push_back(fmt::format("{}_{}", term.name, kAxisName[i]));
+      const NoiseTerm value = reported_terms(noise[i])[term];
+      series.labels.push_back(fmt::format("{}_{}", kTermName[term], kAxisName[i]));
       series.values.push_back(value.value);
       series.u.push_back(value.u);
     }
-    const XmlElement quantity = add_quantity(c, data, "plumbline_noise", term.name);
+    const XmlElement quantity = add_quantity(c, data, "plumbline_noise", kTermName[term]);
     add_list(quantity, series);
     used_method(c, quantity);
   }
@@ -362,15 +386,20 @@ void add_measurement_results(const Context& c, const XmlElement& root) {
   c.text(result, "dcc:name", c.tr("Calibration in the field of gravity"));
   add_methods(c, result);
   add_software(result);
-  add_equipment(c, result);
+  const bool scalar = c.input.scalar != nullptr;
+  if (!scalar) add_equipment(c, result);
   add_conditions(c, result);
   const XmlElement results = result.add("dcc:results");
-  add_parameters(c, results);
-  add_sensor_terms(c, results);
+  if (scalar) {
+    add_scalar(c, results);
+  } else {
+    add_parameters(c, results);
+    add_sensor_terms(c, results);
+  }
   add_effects(c, results);
   add_errors(c, results);
   add_decision(c, results);
-  add_noise(c, results);
+  if (!scalar) add_noise(c, results);
 }
 
 }  // namespace plumbline::app::dcc

@@ -35,6 +35,14 @@ std::optional<DsiUnit> dsi_unit(const std::string& unit) {
   return it->second;
 }
 
+ReadingUnits reading_units(const std::string& reading_unit) {
+  if (reading_unit == "V") {
+    return {dsi::kVolt, "\\metre\\second\\tothe{-2}\\volt\\tothe{-1}", 1};
+  }
+  if (reading_unit == "g") return {dsi::kAcceleration, "\\one", kStandardGravity_mps2};
+  return {"\\one", dsi::kAcceleration, 1};
+}
+
 bool is_dsi_unit(const std::string& text) {
   // What the SI brochure (9th edition) and D-SI 2.2.1 name, as far as a calibration like this one
   // can need it.

@@ -16,6 +16,15 @@ struct DsiUnit {
 /// recorded column).
 std::optional<DsiUnit> dsi_unit(const std::string& unit);
 
+/// Of the readings of a calibration without angles (ScalarSource::reading_unit): volts, g, or a
+/// number where the unit has no name in the SI.
+struct ReadingUnits {
+  std::string bias;   ///< of a reading
+  std::string scale;  ///< of specific force by reading
+  double factor = 1;  ///< bias in `bias` = factor × bias, scale in `scale` = scale / factor
+};
+ReadingUnits reading_units(const std::string& reading_unit);
+
 /// True when the text is a product of known D-SI prefixes and units with numeric exponents.
 bool is_dsi_unit(const std::string& text);
 

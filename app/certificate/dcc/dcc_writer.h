@@ -28,6 +28,8 @@ inline constexpr const char* kOrder = "plumbline_customerOrder";
 inline constexpr const char* kInput = "plumbline_inputSha256";
 inline constexpr const char* kSensitivity = "plumbline_sensitivity";
 inline constexpr const char* kOffset = "plumbline_offset";
+inline constexpr const char* kBias = "plumbline_bias";
+inline constexpr const char* kScale = "plumbline_scale";
 inline constexpr const char* kEffect = "plumbline_effect";
 }  // namespace dcc_ref
 

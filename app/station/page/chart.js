@@ -18,12 +18,12 @@ function surface(canvas) {
   return {c, width: box.width, height: box.height};
 }
 
-// Round numbers that divide [low, high] into about `count` steps.
+// Round numbers that divide [low, high] into about `count` steps, two at least.
 function ticks(low, high, count) {
   const raw = (high - low) / count;
   if (!(raw > 0) || !Number.isFinite(raw)) return [];
   const power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw * 0.999);
+  const step = [1, 2, 5, 10].map((m) => m * power).findLast((s) => s <= raw * 1.5);
   const list = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; ++k) list.push(k * step);
   return list;
@@ -221,5 +221,5 @@ export function drawTrend(canvas, series) {
   // As many serial numbers as there is room for, each cut to its room.
   const every = Math.ceil(points.length / Math.max(1, Math.floor((width - left) / 90)));
   const room = every * (xAt(1) - xAt(0)) - 8;
-  points.forEach((p, i) => { if (i % every === 0) c.fillText(cut(c, p.serial, room), xAt(i), height - box.bottom + 6); });
+  points.forEach((p, i) => { if (i % every === 0) c.fillText(cut(c, p.label ?? p.serial, room), xAt(i), height - box.bottom + 6); });
 }

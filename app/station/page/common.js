@@ -37,9 +37,6 @@ const decisions = {
 export const decisionWords = (decision) => decisions[decision] ?? [decision, "none"];
 
 const minus = (text) => text.replaceAll("-", "−");
-// A quantity with its unit, as headings name it.
-export const named = (name, unit) => `${name} / ${unit.includes("/") ? `(${unit})` : unit}`;
-
 // The place of U's second digit.
 const places = (U) => Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(U))));
 
@@ -51,4 +48,17 @@ export function uncertain(value, U) {
   return U > 0 ? `${rounded(value, U)} ± ${rounded(U, U)}` : rounded(value, U);
 }
 
-export const milli = (value, digits) => typeof value === "number" ? minus((value * 1000).toPrecision(digits)) : "–";
+// In thousandths with so many digits, never as a power of ten.
+export function milli(value, digits) {
+  if (typeof value !== "number") return "–";
+  const large = Math.abs(value * 1000) >= 10 ** digits;
+  return minus(large ? (value * 1000).toFixed(0) : (value * 1000).toPrecision(digits));
+}
+
+// "K_xy" with its index below the line, and its unit.
+export function symbol(name, unit) {
+  const node = element("span");
+  const [letter, index] = name.startsWith("U0_") ? ["U", `0${name.slice(3)}`] : name.split("_");
+  node.append(letter, element("sub", index), ` / ${unit.includes("/") ? `(${unit})` : unit}`);
+  return node;
+}

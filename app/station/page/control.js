@@ -30,8 +30,12 @@ function arrange() {
   id("start").hidden = !control || station.plans.length === 0 || running || phase === "calculating" || Boolean(station.last_start?.running);
   // A scanner types the serial number and Enter.
   if (wasHidden && !id("start").hidden) id("start-serial").focus();
+  const focused = document.activeElement;
   id("pause").disabled = status?.state === "paused" || status?.pause_requested !== "none";
   id("resume").disabled = status?.state !== "paused" && status?.pause_requested === "none";
+  // The focus would be lost on a button that is off; the other one is what may be wanted next.
+  if (focused === id("pause") && focused.disabled) id("resume").focus();
+  if (focused === id("resume") && focused.disabled) id("pause").focus();
   const unfinished = control && Boolean(run?.id) && ["interrupted", "stopped", "failed"].includes(phase)
     && station.resumable.length > 0 && !station.last_start?.running;
   id("unfinished").hidden = !unfinished;

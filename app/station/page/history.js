@@ -1,6 +1,6 @@
 // Runs, their comparison, and parameters over units.
 import {drawTrend} from "/chart.js";
-import {ask, cell, decisionWords, element, id, milli, named, rounded, uncertain, whenLooksChange} from "/common.js";
+import {ask, cell, decisionWords, element, id, milli, rounded, symbol, uncertain, whenLooksChange} from "/common.js";
 
 const threeAxes = (values) => values.map((v) => milli(v, 2)).join("  ");
 
@@ -61,7 +61,7 @@ id("compare").addEventListener("click", async () => {
   card.hidden = false;
   try {
     const both = await ask(`/api/compare?a=${a}&b=${b}`);
-    const table = element("table", "", {class: "stack"});
+    const table = element("table", "", {class: "stack", "aria-label": `Run ${a} and run ${b}`});
     const head = element("tr");
     for (const name of ["Parameter", `Run ${a} (${both.a.serial})`, `Run ${b} (${both.b.serial})`, "Difference", "Eₙ"]) head.append(element("th", name, {scope: "col"}));
     table.append(element("thead", head));
@@ -69,8 +69,8 @@ id("compare").addEventListener("click", async () => {
     for (const row of both.parameters) {
       const line = element("tr");
       const far = row.E_n === null || Math.abs(row.E_n) > 1;
-      const E_n = `${row.E_n === null ? "∞" : rounded(row.E_n, 0.1)}${far ? "  differs" : ""}`;
-      line.append(element("th", named(row.name, row.unit), {scope: "row"}), cell(`Run ${a}`, uncertain(row.a, row.U_a)), cell(`Run ${b}`, uncertain(row.b, row.U_b)),
+      const E_n = `${row.E_n === null ? "∞" : rounded(row.E_n, Math.abs(row.E_n) < 100 ? 0.1 : 10)}${far ? "  differs" : ""}`;
+      line.append(element("th", symbol(row.name, row.unit), {scope: "row"}), cell(`Run ${a}`, uncertain(row.a, row.U_a)), cell(`Run ${b}`, uncertain(row.b, row.U_b)),
         cell("Difference", rounded(row.difference, Math.hypot(row.U_a, row.U_b))), cell("Eₙ", element("span", E_n, far ? {class: "tag bad"} : {})));
       body.append(line);
     }
@@ -95,7 +95,7 @@ function trendCard(series) {
     if (chart?.outside.length) facts += `; ${chart.outside.length} beyond the limits`;
   }
   const figure = element("figure", "", {class: "card trend"});
-  figure.append(element("figcaption", named(name, unit)), element("canvas", "", {role: "img", "aria-label": `${name} over ${points.length} runs: ${facts}`}),
+  figure.append(element("figcaption", symbol(name, unit)), element("canvas", "", {role: "img", "aria-label": `${name} over ${points.length} ${points.length === 1 ? "run" : "runs"}: ${facts}`}),
     element("p", facts, {class: "figures"}));
   return figure;
 }
@@ -128,6 +128,8 @@ export async function showUnits() {
   fill(id("trends"), all.units, "No unit has been certified yet.");
   id("golden-card").hidden = !all.golden_serial;
   id("golden-serial").textContent = all.golden_serial;
+  // It is one unit: when it was measured tells its points apart.
+  for (const {points} of all.golden) for (const point of points) point.label = point.utc.slice(0, 10);
   fill(id("golden"), all.golden, "It has not been measured yet.");
   drawCharts();
 }

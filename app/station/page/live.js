@@ -46,6 +46,12 @@ function clock(seconds) {
 
 const text = (name, value) => { const node = id(name); if (node.textContent !== value) node.textContent = value; };
 
+// One of the facts below the state; without a value it is left out.
+function fact(name, value) {
+  text(name, value);
+  id(name).parentElement.hidden = value === "";
+}
+
 // Nothing where the station does not answer: the next message asks again.
 const get = (path) => ask(path).catch(() => null);
 
@@ -111,12 +117,11 @@ function board() {
   text("reason", phase === "running" ? status.reason : verdict ? outcome(verdict) : reasons[phase] ?? "");
   text("serial", run?.serial ?? "–");
   text("run", run?.id ? String(run.id) : "–");
-  text("done", status ? `${status.done} of ${status.steps}` : "–");
-  text("remaining", status ? clock(status.remaining_s) : "–");
   const temp = status?.newest?.temp_C;
-  text("temperature", typeof temp === "number" ? `${temp.toFixed(2)} °C` : "–");
-  text("alarms", status ? alarmWords(status) : "");
-  id("alarms").parentElement.hidden = id("alarms").textContent === "";
+  fact("done", status ? `${status.done} of ${status.steps}` : "");
+  fact("remaining", status ? clock(status.remaining_s) : "");
+  fact("temperature", typeof temp === "number" ? `${temp.toFixed(2)} °C` : "");
+  fact("alarms", status ? alarmWords(status) : "");
   id("progress").value = status ? status.progress : phase === "finished" || phase === "calculating" ? 1 : 0;
   const box = id("verdict");
   box.hidden = !verdict;
@@ -130,7 +135,7 @@ function board() {
 
 // What needed attention in this session, and the drive's own alarm.
 function alarmWords({head, attention}) {
-  const parts = head.alarm ? ["drive alarm"] : [];
+  const parts = head.alarm.flatMap((code, i) => code === 0 ? [] : [`drive alarm ${code.toString(16).toUpperCase()}h (${["δ", "h"][i]})`]);
   for (const [kind, count] of Object.entries(attention)) if (count > 0) parts.push(`${kind.replace("_", " ")} ${count}`);
   return parts.join(", ");
 }
@@ -198,8 +203,11 @@ function showHead() {
   drawing.setAttribute("aria-label", `Pose of the head: ${line}`);
 }
 
+// In the kiosk view, where nothing can be pressed, the axes take turns.
 const choice = id("map-axis");
-["x", "y", "z"].forEach((name, i) => {
+const kiosk = document.documentElement.dataset.view === "kiosk";
+if (kiosk) setInterval(() => { axis = (axis + 1) % 3; dirty = true; }, 10000);
+else ["x", "y", "z"].forEach((name, i) => {
   const button = element("button", name, {type: "button", "aria-pressed": String(i === axis), "aria-label": `axis ${name}`});
   button.addEventListener("click", () => {
     axis = i;
@@ -212,6 +220,8 @@ const choice = id("map-axis");
 function draw() {
   if (dirty && live && !id("view-live").hidden) {
     dirty = false;
+    // Of a run that was over before this station was started only the poses are known.
+    document.body.toggleAttribute("data-past", live.phase !== "running" && rows.length === 0);
     showHead();
     drawTrace(id("trace"), rows, kSpan_s, live.phase === "running" ? "no samples yet" : "traces are shown while a run is going on");
     const full = drawMap(id("map"), live.run?.delta_deg ? live.run : null, poses, axis, live.status?.target);
