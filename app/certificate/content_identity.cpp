@@ -50,6 +50,15 @@ std::string location_text(const Composer& c) {
   return c.tr("elsewhere");
 }
 
+std::string gravity_text(const Composer& c) {
+  const auto& gravity = c.input.description.gravity;
+  if (!(gravity.u_mps2 > 0)) {
+    return c.tr("g = {} m/s²; uncertainty not stated", significant(gravity.local_mps2, 7));
+  }
+  return fmt::format("g = {}, k = 2",
+                     result_with_unit(gravity.local_mps2, 2 * gravity.u_mps2, "m/s²"));
+}
+
 }  // namespace
 
 void add_identification(const Composer& c) {
@@ -76,19 +85,6 @@ void add_identification(const Composer& c) {
   };
   c.add(std::move(facts));
 }
-
-namespace {
-
-std::string gravity_text(const Composer& c) {
-  const auto& gravity = c.input.description.gravity;
-  if (!(gravity.u_mps2 > 0)) {
-    return c.tr("g = {} m/s²; uncertainty not stated", significant(gravity.local_mps2, 7));
-  }
-  return fmt::format("g = {}, k = 2",
-                     result_with_unit(gravity.local_mps2, 2 * gravity.u_mps2, "m/s²"));
-}
-
-}  // namespace
 
 void add_method(const Composer& c) {
   const RunDescription& run = c.input.description;

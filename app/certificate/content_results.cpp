@@ -207,15 +207,22 @@ void add_parameters(const Composer& c) {
   add_ieee_terms(c);
 }
 
+Table budget_table(const Composer& c, std::string caption, std::string contribution) {
+  Table table;
+  table.caption = std::move(caption);
+  table.header = {c.tr("parameter"), c.tr("quantity"), c.tr("estimate"), c.tr("distribution"),
+                  c.tr("u"),         c.tr("ν"),        c.tr("c"),        std::move(contribution),
+                  c.tr("share")};
+  table.word_columns = {1, 3};
+  return table;
+}
+
 void add_budget(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
   c.add(Heading{c.tr("Uncertainty budget")});
-  Table table;
-  table.caption = c.tr("Scale factors and offsets (GUM, JCGM 100:2008), U with k = 2");
-  table.header = {c.tr("parameter"), c.tr("quantity"), c.tr("estimate"), c.tr("distribution"),
-                  c.tr("u"),         c.tr("ν"),        c.tr("c"),        c.tr("c·u, mV/g (mV)"),
-                  c.tr("share")};
-  table.word_columns = {1, 3};
+  Table table =
+      budget_table(c, c.tr("Scale factors and offsets (GUM, JCGM 100:2008), U with k = 2"),
+                   c.tr("c·u, mV/g (mV)"));
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     for (const Eigen::Index column : {static_cast<Eigen::Index>(i), Eigen::Index{3}}) {
       add_budget_rows(c, budget_of(calibration, c.input.description, i, column), table);

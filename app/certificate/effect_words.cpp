@@ -24,8 +24,7 @@ constexpr std::array<EffectWords, 30> kEffects = {{
      "k_xy·a_x·a_y + k_xz·a_x·a_z + k_yz·a_y·a_z"},
     {"sensor.hysteresis", "hysteresis",
      "+w/2 where a_i rose on the way to the position, −w/2 where it fell; start: how the first "
-     "position was "
-     "reached"},
+     "position was reached"},
     {"sensor.temperature_bias", "bias that follows the temperature", "b1·(T − T₀)"},
     {"sensor.temperature_scale", "scale factor that follows the temperature", "s1·(T − T₀)·a_i"},
     {"sensor.warmup", "warm-up of the bias", "b·exp(−t/tau)"},
@@ -53,8 +52,7 @@ constexpr std::array<EffectWords, 30> kEffects = {{
     {"rig.h_eccentricity", "eccentricity of the tilt circle", "h + c·cos h + s·sin h"},
     {"rig.backlash", "backlash of the spindle",
      "δ ± w/2 by the direction in which δ was approached; way 0: the shorter way round, 1: never "
-     "past "
-     "360°; start: how the first angle was reached"},
+     "past 360°; start: how the first angle was reached"},
     {"rig.index_slip", "slip of the spindle's index",
      "δ + epsilon from the position numbered pose on"},
     {"rig.pose_outlier", "poses at a wrong angle", "δ + delta and h + h at single positions"},

@@ -130,12 +130,8 @@ void add_budget_of(const Composer& c, Eigen::Index index, Table& table) {
 
 void add_scalar_budget(const Composer& c) {
   c.add(Heading{c.tr("Uncertainty budget")});
-  Table table;
-  table.caption = c.tr("Bias and scale (GUM, JCGM 100:2008), U with k = 2");
-  table.header = {c.tr("parameter"), c.tr("quantity"), c.tr("estimate"), c.tr("distribution"),
-                  c.tr("u"),         c.tr("ν"),        c.tr("c"),        c.tr("c·u"),
-                  c.tr("share")};
-  table.word_columns = {1, 3};
+  Table table =
+      budget_table(c, c.tr("Bias and scale (GUM, JCGM 100:2008), U with k = 2"), c.tr("c·u"));
   for (Eigen::Index index = 0; index < 6; ++index) add_budget_of(c, index, table);
   c.add(std::move(table));
   c.add(

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "app/figure/plot.h"
 #include "app/figure/svg_canvas.h"
+#include "estimator/noise/record_terms.h"
 
 namespace plumbline::app {
 
@@ -49,12 +49,6 @@ void append(std::vector<double>& all, const std::vector<double>& some) {
   all.insert(all.end(), some.begin(), some.end());
 }
 
-/// Allan variance of a Gauss-Markov process of variance 1 (IEEE Std 952, annex C); x = τ/T_c.
-double markov_variance(double x) {
-  if (x < 1e-3) return x / 3;
-  return 2 / x * (1 - (3 - 4 * std::exp(-x) + std::exp(-2 * x)) / (2 * x));
-}
-
 /// Where the name of a curve stands: at the end at which it is higher, for its middle lies among
 /// the others.
 std::size_t place_of_name(const std::vector<double>& curve) {
@@ -64,34 +58,22 @@ std::size_t place_of_name(const std::vector<double>& curve) {
 }  // namespace
 
 std::vector<AllanTerm> allan_terms(const NoiseModel& noise) {
-  const auto terms = reported_terms(noise);
-  const auto deviation = [](std::size_t term, double tau) {
-    switch (term) {
-      case kTermQ:
-        return std::sqrt(3.0) / tau;
-      case kTermN:
-        return 1 / std::sqrt(tau);
-      case kTermB:
-        return std::sqrt(2 * std::numbers::ln2 / std::numbers::pi);
-      case kTermK:
-        return std::sqrt(tau / 3);
-      default:
-        return tau / std::numbers::sqrt2;
-    }
-  };
+  RecordTerms shown = noise.record;
+  shown.term = reported_terms(noise);
   std::vector<AllanTerm> curves;
+  std::vector<std::size_t> present;
   for (std::size_t term = 0; term < kTermCount; ++term) {
-    if (!terms[term].present) continue;
+    if (!shown.term[term].present) continue;
+    present.push_back(term);
     curves.push_back({kTermName[term], {}});
-    for (const double tau : noise.oadev.tau_s) {
-      curves.back().value.push_back(terms[term].value * deviation(term, tau));
-    }
   }
-  for (const MarkovTerm& markov : noise.record.markov) {
-    curves.push_back({"M", {}});
-    for (const double tau : noise.oadev.tau_s) {
-      curves.back().value.push_back(markov.sigma * std::sqrt(markov_variance(tau / markov.tau_s)));
-    }
+  for (std::size_t m = 0; m < shown.markov.size(); ++m) curves.push_back({"M", {}});
+  for (const double tau_s : noise.oadev.tau_s) {
+    const AllanParts parts = allan_parts_of(shown, tau_s);
+    std::size_t curve = 0;
+    for (const std::size_t term : present)
+      curves[curve++].value.push_back(std::sqrt(parts.term[term]));
+    for (const double part : parts.markov) curves[curve++].value.push_back(std::sqrt(part));
   }
   return curves;
 }

@@ -134,9 +134,13 @@ bool LiveFeed::session_running() const {
   return running_;
 }
 
-bool LiveFeed::at_rest() const {
-  const std::lock_guard lock(mutex_);
-  return phase_ != "running" && phase_ != "calculating";
+void LiveFeed::catch_up(milliseconds longest) {
+  std::unique_lock lock(mutex_);
+  const std::uint64_t wanted = ++looks_wanted_;
+  changed_.notify_all();
+  changed_.wait_for(lock, longest, [&] {
+    return looks_done_ >= wanted && phase_ != "running" && phase_ != "calculating";
+  });
 }
 
 void LiveFeed::follow(const std::stop_token& stop) {
@@ -149,10 +153,15 @@ void LiveFeed::follow(const std::stop_token& stop) {
       status_ = Json();
       turn = 0;
     }
-    if (turn % kTurnsPerLook == 0) look_at_database();
-    std::mutex alone;
-    std::unique_lock lock(alone);
-    std::condition_variable_any().wait_for(lock, stop, kLookAgain, [] { return false; });
+    std::unique_lock lock(mutex_);
+    const std::uint64_t wanted = looks_wanted_;
+    const bool look = turn % kTurnsPerLook == 0 || wanted > looks_done_;
+    lock.unlock();
+    if (look) look_at_database();
+    lock.lock();
+    looks_done_ = wanted;
+    changed_.notify_all();
+    changed_.wait_for(lock, stop, kLookAgain, [&] { return looks_wanted_ > looks_done_; });
   }
 }
 

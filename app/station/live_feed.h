@@ -71,8 +71,9 @@ class LiveFeed {
   /// The newest STATUS; null when no session is on.
   Json status() const;
   bool session_running() const;
-  /// Whether nothing goes on: neither a session, nor the calculation of what it measured.
-  bool at_rest() const;
+  /// Looks once more at what is there, and waits until nothing goes on: neither a session, nor the
+  /// calculation of what it measured.
+  void catch_up(std::chrono::milliseconds longest);
 
  private:
   void follow(const std::stop_token& stop);
@@ -90,7 +91,7 @@ class LiveFeed {
 
   const History& history_;
   mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
+  mutable std::condition_variable_any changed_;
   std::shared_ptr<const LiveMessage> newest_ = std::make_shared<LiveMessage>();
 
   // Under the mutex, because viewers ask for them.
@@ -100,6 +101,8 @@ class LiveFeed {
   Json status_;
   bool running_ = false;
   std::string phase_;
+  std::uint64_t looks_wanted_ = 0;
+  std::uint64_t looks_done_ = 0;  ///< of those wanted
 
   // Of the thread alone.
   storage::RunId run_ = 0;

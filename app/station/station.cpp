@@ -406,12 +406,9 @@ Result<std::unique_ptr<Station>> Station::start(const StationOptions& options) {
 const ListenAddress& Station::address() const { return parts_->server->address(); }
 
 void Station::let_viewers_see_the_end() const {
-  const auto anybody = [&] { return parts_->viewers->load() > 0; };
-  for (auto left = kFarewell; left.count() > 0 && anybody() && !parts_->feed.at_rest();
-       left -= kTurn) {
-    std::this_thread::sleep_for(kTurn);
-  }
-  if (anybody()) std::this_thread::sleep_for(5 * kTurn);  // the last message is on its way
+  if (parts_->viewers->load() == 0) return;
+  parts_->feed.catch_up(kFarewell);
+  std::this_thread::sleep_for(5 * kTurn);  // the last message is on its way
 }
 
 }  // namespace plumbline::app

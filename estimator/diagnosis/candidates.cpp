@@ -1,6 +1,5 @@
 #include "estimator/diagnosis/candidates.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -8,6 +7,7 @@
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
+#include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -214,11 +214,7 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
 
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
     : responses_(responses) {
-  const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
-  const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
-  model_basis_ = qr.householderQ() * Eigen::MatrixXd::Identity(scaled.rows(), scaled.cols());
-
+  model_basis_ = orthonormal_basis(fit.whitened_jacobian);
   std::array<Eigen::MatrixXd, kHead + 1> taken;  // by the model's parameters, columns × p
   parallel_for(taken.size(),
                [&](std::size_t g) { taken[g] = responses.groups[g].products(model_basis_); });

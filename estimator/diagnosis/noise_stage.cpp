@@ -118,6 +118,20 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters, con
 
 namespace {
 
+/// One more column: value_of(visit) at every visit, centred and of unit length. What is not
+/// recorded throughout or never changes adds none.
+template <typename ValueOf>
+void append_centred(const VisitLog& log, Eigen::MatrixXd& functions, const ValueOf& value_of) {
+  const auto n = static_cast<Eigen::Index>(log.visits.size());
+  Eigen::VectorXd column(n);
+  for (Eigen::Index k = 0; k < n; ++k)
+    column(k) = value_of(log.visits[static_cast<std::size_t>(k)]);
+  column.array() -= column.mean();
+  if (!column.allFinite() || !(column.norm() > 0)) return;
+  functions.conservativeResize(n, functions.cols() + 1);
+  functions.rightCols<1>() = column.normalized();
+}
+
 bool is_slow_in_order(const Eigen::VectorXd& values) {
   constexpr double kSlow = 0.05;  // mean squared change from visit to visit, of twice the variance
   const Eigen::Index changes = values.size() - 1;
@@ -130,15 +144,7 @@ bool is_slow_in_order(const Eigen::VectorXd& values) {
 Eigen::MatrixXd slow_functions(const VisitLog& log) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   Eigen::MatrixXd functions(n, 0);
-  const auto add = [&](const auto& value_of) {
-    Eigen::VectorXd column(n);
-    for (Eigen::Index k = 0; k < n; ++k)
-      column(k) = value_of(log.visits[static_cast<std::size_t>(k)]);
-    column.array() -= column.mean();
-    if (!column.allFinite() || !(column.norm() > 0)) return;
-    functions.conservativeResize(Eigen::NoChange, functions.cols() + 1);
-    functions.rightCols<1>() = column.normalized();
-  };
+  const auto add = [&](const auto& value_of) { append_centred(log, functions, value_of); };
   const double middle_s = 0.5 * (log.first_s() + log.last_s());
   add([&](const Visit& visit) { return visit.t_mean_s - middle_s; });
   add([&](const Visit& visit) { return std::pow(visit.t_mean_s - middle_s, 2); });
@@ -156,20 +162,14 @@ Eigen::MatrixXd slow_functions(const VisitLog& log) {
 }
 
 Eigen::MatrixXd any_course_of_time(const VisitLog& log) {
-  const auto n = static_cast<Eigen::Index>(log.visits.size());
-  const Eigen::Index waves = std::min<Eigen::Index>(16, n / 12);
-  const Eigen::MatrixXd slow = slow_functions(log);
-  Eigen::MatrixXd functions(n, slow.cols() + waves);
-  functions.leftCols(slow.cols()) = slow;
-  for (Eigen::Index w = 0; w < waves; ++w) {
-    auto column = functions.col(slow.cols() + w);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const double t_s = log.visits[static_cast<std::size_t>(k)].t_mean_s - log.first_s();
-      column(k) = std::cos(std::numbers::pi * static_cast<double>(w + 1) * t_s /
-                           (log.last_s() - log.first_s()));
-    }
-    column.array() -= column.mean();
-    column.normalize();
+  Eigen::MatrixXd functions = slow_functions(log);
+  const std::ptrdiff_t waves = std::min<std::ptrdiff_t>(16, std::ssize(log.visits) / 12);
+  for (std::ptrdiff_t w = 1; w <= waves; ++w) {
+    const double rate_per_s =
+        std::numbers::pi * static_cast<double>(w) / (log.last_s() - log.first_s());
+    append_centred(log, functions, [&](const Visit& visit) {
+      return std::cos(rate_per_s * (visit.t_mean_s - log.first_s()));
+    });
   }
   return functions;
 }

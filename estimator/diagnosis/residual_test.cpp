@@ -77,8 +77,7 @@ Eigen::MatrixXd structure_functions(const Eigen::MatrixXd& a, const Eigen::Matri
   Eigen::MatrixXd all(n, static_cast<Eigen::Index>(columns.size()));
   for (std::size_t c = 0; c < columns.size(); ++c)
     all.col(static_cast<Eigen::Index>(c)) = columns[c];
-  const Eigen::HouseholderQR<Eigen::MatrixXd> design_qr(design);
-  const Eigen::MatrixXd q = design_qr.householderQ() * Eigen::MatrixXd::Identity(n, design.cols());
+  const Eigen::MatrixXd q = orthonormal_basis(design);
   all -= q * (q.transpose() * all);
   // On the sphere the monomials are dependent.
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
@@ -174,14 +173,14 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   full << input.design, functions;
   const bool enough = n >= input.design.cols() + 3 * functions.cols();
   const NoisePool pool(input.processes, noise, input.extra_variance);
-  const PooledNoise plain_noise = pool.pool(y, input.design);
-  Judgement judged = judge(pool, plain_noise, y, input.design, functions, input.design.cols());
+  Judgement judged =
+      judge(pool, pool.pool(y, input.design), y, input.design, functions, input.design.cols());
   ResidualTestResult result;
   if (enough) {
     // With the noise estimated beside the model alone, structure is partly taken for slow noise;
     // beside the functions, too, slow noise is partly taken for structure. Both count.
-    Judgement rich = judge(pool, pool.pool(y, full, &plain_noise.power), y, input.design, functions,
-                           full.cols());
+    Judgement rich = judge(pool, pool.pool(y, full, &judged.noise.power), y, input.design,
+                           functions, full.cols());
     result.p_structure = merged(judged.p_structure, rich.p_structure);
     if (result.p_structure < kStructureSeen) judged = std::move(rich);
   }

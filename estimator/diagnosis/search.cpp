@@ -1,6 +1,5 @@
 #include "estimator/diagnosis/search.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
+#include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
@@ -271,11 +271,12 @@ class Search {
         candidate_responses(input_.log, list_, rich.whitening, rich_fit.parameters);
     const CandidateGains gains(beside_slow, rich_fit);
     std::vector<Scored> ranked = screen(list_, gains, gains.of(rich_fit.whitened_residual).col(0));
+    const Eigen::MatrixXd slow = orthonormal_basis(beside);
     std::erase_if(ranked, [&](const Scored& s) {
       const Candidate& c = list_.candidates[s.candidate];
       return c.effect->subject() == Subject::head || !worth_a_look[c.axis] ||
              std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c) ||
-             !is_slow(c, beside);
+             !is_within(c, slow);
     });
     std::vector<Stage> stages(std::min(kRefined, ranked.size()));
     parallel_for(stages.size(), [&](std::size_t k) {
@@ -314,15 +315,14 @@ class Search {
   }
 
   /// Whether most of what a candidate does to its axis lies in the span of the slow functions.
-  bool is_slow(const Candidate& candidate, const Eigen::MatrixXd& functions) const {
+  bool is_within(const Candidate& candidate, const Eigen::MatrixXd& basis) const {
     constexpr double kMost = 0.7;  // of the sum of squares
     const EnlargedParameters& model = stage_.fit.parameters;
     Eigen::VectorXd change =
         predict_means_V(input_.log, with_effect(model, candidate.active()))[candidate.axis] -
         predict_means_V(input_.log, model)[candidate.axis];
     change.array() -= change.mean();
-    const Eigen::VectorXd left = change - functions * functions.colPivHouseholderQr().solve(change);
-    return left.squaredNorm() < (1 - kMost) * change.squaredNorm();
+    return (basis.transpose() * change).squaredNorm() > kMost * change.squaredNorm();
   }
 
   /// A term that holds one of the model's effects as a special case cannot stand beside it: it

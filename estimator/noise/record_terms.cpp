@@ -368,34 +368,55 @@ RecordTerms describe_record(const LineSearch& search, const std::vector<double>&
   return result;
 }
 
-double allan_deviation_of(const RecordTerms& terms, double tau_s) {
+namespace {
+
+/// Of a Gauss-Markov process of variance 1.
+double markov_allan_variance(double tau_s, double correlation_s) {
+  const double x = tau_s / correlation_s;
+  if (x < 1e-3) return x / 3;
+  return 2 / x * (1 - (3 - 4 * std::exp(-x) + std::exp(-2 * x)) / (2 * x));
+}
+
+/// Of flicker with coefficient 1 U between the limits that the record shows.
+double flicker_allan_variance(const RecordTerms& terms, double tau_s) {
   using std::numbers::ln2;
   using std::numbers::pi;
-  const auto value = [&](std::size_t i) { return terms.term[i].value; };
-  double variance = 3 * square(value(kTermQ) / tau_s) + square(value(kTermN)) / tau_s +
-                    square(value(kTermK)) * tau_s / 3 + 0.5 * square(value(kTermR) * tau_s);
-  // A Gauss-Markov process of variance 1 (IEEE Std 952, annex C).
-  const auto markov = [&](double correlation_s) {
-    const double x = tau_s / correlation_s;
-    if (x < 1e-3) return x / 3;
-    return 2 / x * (1 - (3 - 4 * std::exp(-x) + std::exp(-2 * x)) / (2 * x));
-  };
-  for (const MarkovTerm& term : terms.markov) variance += square(term.sigma) * markov(term.tau_s);
-  if (terms.flicker_low_hz == 0 && !std::isfinite(terms.flicker_high_hz)) {
-    variance += square(value(kTermB)) * 2 * ln2 / pi;
-  } else {
-    // The continuum of relaxation processes, two in an octave.
-    const double step = 0.5 * ln2;
-    const double low = std::log(terms.flicker_low_hz > 0 ? terms.flicker_low_hz : 1e-5 / tau_s);
-    const double high =
-        std::log(std::isfinite(terms.flicker_high_hz) ? terms.flicker_high_hz : 1e5 / tau_s);
-    for (double log_hz = low + 0.5 * step; log_hz < high; log_hz += step)
-      variance += square(value(kTermB)) * step / pi * markov(1 / (2 * pi * std::exp(log_hz)));
-  }
+  if (terms.flicker_low_hz == 0 && !std::isfinite(terms.flicker_high_hz)) return 2 * ln2 / pi;
+  // The continuum of relaxation processes, two in an octave.
+  const double step = 0.5 * ln2;
+  const double low = std::log(terms.flicker_low_hz > 0 ? terms.flicker_low_hz : 1e-5 / tau_s);
+  const double high =
+      std::log(std::isfinite(terms.flicker_high_hz) ? terms.flicker_high_hz : 1e5 / tau_s);
+  double variance = 0;
+  for (double log_hz = low + 0.5 * step; log_hz < high; log_hz += step)
+    variance += step / pi * markov_allan_variance(tau_s, 1 / (2 * pi * std::exp(log_hz)));
+  return variance;
+}
+
+}  // namespace
+
+AllanParts allan_parts_of(const RecordTerms& terms, double tau_s) {
+  const auto power = [&](std::size_t i) { return square(terms.term[i].value); };
+  AllanParts parts;
+  parts.term[kTermQ] = 3 * power(kTermQ) / square(tau_s);
+  parts.term[kTermN] = power(kTermN) / tau_s;
+  parts.term[kTermB] = power(kTermB) * flicker_allan_variance(terms, tau_s);
+  parts.term[kTermK] = power(kTermK) * tau_s / 3;
+  parts.term[kTermR] = 0.5 * power(kTermR) * square(tau_s);
+  for (const MarkovTerm& term : terms.markov)
+    parts.markov.push_back(square(term.sigma) * markov_allan_variance(tau_s, term.tau_s));
   for (const SpectralLine& line : terms.lines) {
-    const double x = pi * line.f_hz * tau_s;
-    variance += square(line.amplitude * square(std::sin(x)) / x);
+    const double x = std::numbers::pi * line.f_hz * tau_s;
+    parts.lines += square(line.amplitude * square(std::sin(x)) / x);
   }
+  return parts;
+}
+
+double allan_deviation_of(const RecordTerms& terms, double tau_s) {
+  const AllanParts parts = allan_parts_of(terms, tau_s);
+  double variance = parts.lines;
+  for (const double part : parts.term) variance += part;
+  for (const double part : parts.markov) variance += part;
   return std::sqrt(variance);
 }
 

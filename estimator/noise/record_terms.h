@@ -1,6 +1,7 @@
 // All terms that describe a record's spectrum, chosen by what the record shows.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "estimator/noise/line_search.h"
@@ -21,6 +22,15 @@ namespace plumbline {
 ///   fall (RecordTerms::band_hz): the sensor's bandwidth.
 RecordTerms describe_record(const LineSearch& search, const std::vector<double>& record,
                             double rate_hz);
+
+/// What each part of a record's terms adds to its Allan variance, U².
+struct AllanParts {
+  std::array<double, kTermCount> term{};  ///< Q, N, B (with its limits), K, R
+  std::vector<double> markov;             ///< one for each Gauss-Markov term
+  double lines = 0;
+};
+/// At averaging time tau_s (IEEE Std 952-1997, annex C).
+AllanParts allan_parts_of(const RecordTerms& terms, double tau_s);
 
 /// Allan deviation that the terms would show at averaging time tau_s, lines included.
 double allan_deviation_of(const RecordTerms& terms, double tau_s);

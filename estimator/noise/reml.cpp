@@ -159,8 +159,10 @@ Eigen::MatrixXd NoisePool::covariance(const Eigen::VectorXd& power) const {
   return sum;
 }
 
-void NoisePool::add_record(const Eigen::VectorXd& power, Point& point) const {
-  if (densities_.size() == 0) return;
+NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power) const {
+  const Eigen::Index count = processes_->count();
+  Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  if (densities_.size() == 0) return point;
   const std::vector<SpectrumBin>& bins = model_.descriptions.front().bins;
   const Eigen::VectorXd variance = densities_ * power;
   // The straight line is profiled out; what is left of it gives back one degree of freedom.
@@ -191,13 +193,12 @@ void NoisePool::add_record(const Eigen::VectorXd& power, Point& point) const {
       square(slope_variance) * once * once.transpose();
   point.normal += normal;
   point.right += densities_.transpose() * excess + normal * power;
+  return point;
 }
 
 NoisePool::Point NoisePool::evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
-  const Eigen::Index count = processes_->count();
-  Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  add_record(power, point);
+  Point point = record_at(power);
   const Projector projector = make_projector(lower_covariance(power), design);
   const Eigen::VectorXd py = projector.P * mean;
   point.deviance += projector.log_determinant + mean.dot(py);
@@ -236,9 +237,6 @@ NoisePool::Seen NoisePool::see(const Eigen::MatrixXd& P, const Eigen::VectorXd& 
 
 Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
                                           const std::vector<Eigen::Index>& wanted) const {
-  const Eigen::Index count = processes_->count();
-  Point record{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  add_record(power, record);
   std::vector<Eigen::MatrixXd> seen;
   for (const Eigen::Index i : wanted) {
     const auto index = static_cast<std::size_t>(i);
@@ -248,7 +246,7 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
     else
       seen.emplace_back(P * unit);
   }
-  Eigen::MatrixXd information = record.normal(wanted, wanted);
+  Eigen::MatrixXd information = record_at(power).normal(wanted, wanted);
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);

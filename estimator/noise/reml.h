@@ -59,8 +59,8 @@ class NoisePool {
  private:
   struct Point;
   struct Seen;
-  /// The record's restricted likelihood and its derivatives, added to `point`.
-  void add_record(const Eigen::VectorXd& power, Point& point) const;
+  /// The record's restricted likelihood and its derivatives; zero without a record.
+  Point record_at(const Eigen::VectorXd& power) const;
   Eigen::MatrixXd lower_covariance(const Eigen::VectorXd& power) const;
   Seen see(const Eigen::MatrixXd& P, const Eigen::VectorXd& py) const;
   Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,

@@ -252,7 +252,10 @@ class ServedRun : public RunProgram {
 
 TEST_F(ServedRun, PageShowsTheRunAndGivesOrders) {
   start_serving();
-  wait_for_poses(2);
+  wait_for_poses(1);
+  EXPECT_EQ(order("pause"), 200);  // first of all: the whole run takes little more than a second
+  wait_for_state("paused");
+  const long long before = summary().poses;
   std::vector<Connection> viewers;
   for (int i = 0; i < 16; ++i) viewers.push_back(viewer());
   for (Connection& one : viewers) {
@@ -260,9 +263,6 @@ TEST_F(ServedRun, PageShowsTheRunAndGivesOrders) {
   }
   EXPECT_EQ(get("/api/live")["run"]["serial"], "A-1");
   EXPECT_FALSE(get("/api/trace")["trace"].empty());
-  EXPECT_EQ(order("pause"), 200);
-  wait_for_state("paused");
-  const long long before = summary().poses;
   std::this_thread::sleep_for(milliseconds{500});
   EXPECT_EQ(summary().poses, before);
   EXPECT_EQ(order("resume"), 200);
@@ -281,9 +281,9 @@ TEST_F(ServedRun, PageShowsTheRunAndGivesOrders) {
 
 TEST_F(ServedRun, StopFromThePageEndsTheRunSafely) {
   start_serving();
-  wait_for_poses(2);
   Connection one = viewer();
   one.receive_until("data: ");
+  wait_for_poses(1);
   EXPECT_EQ(order("stop"), 200);
   EXPECT_THAT(one.receive_until("\"phase\":\"stopped\""), HasSubstr("\"phase\":\"stopped\""));
   EXPECT_EQ(wait_for_end(), 3);

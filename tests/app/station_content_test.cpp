@@ -9,6 +9,7 @@
 #include "app/station/running_fit.h"
 #include "app/station/statistics.h"
 #include "tests/app/program.h"
+#include "tests/app/result_example.h"
 #include "tests/app/station_fixture.h"
 
 namespace plumbline::app {
@@ -32,29 +33,10 @@ nlohmann::json await(const std::function<nlohmann::json()>& look,
   return last;
 }
 
-void write_result(const fs::path& folder, const std::string& chain_head, double Kxx,
+void write_result(const fs::path& folder, const std::string& chain_head, double K_xx,
                   const std::string& decision) {
   fs::create_directories(folder);
-  nlohmann::json axis = {{"K_V_per_g", {Kxx, 0.001, 0.002}},
-                         {"U0_V", -2.5},
-                         {"u_K_V_per_g", {1e-5, 1e-5, 1e-5}},
-                         {"u_U0_V", 2e-5}};
-  const nlohmann::json errors = {{"heldout_pose_rms", {0.02, 0.01, 0.03}}};
-  write_text(
-      folder / "result.json",
-      nlohmann::json{
-          {"schema", "plumbline.result/1"},
-          {"provenance", {{"chain_head", chain_head}, {"created_utc", "2026-01-02T05:00:00Z"}}},
-          {"decision",
-           {{"status", decision},
-            {"limit_mps2", 0.2},
-            {"max_abs_error_mps2", 0.03},
-            {"u_mps2", 0.001}}},
-          {"diagnosis",
-           {{"verdict", "clean"}, {"reason", ""}, {"effects", nlohmann::json::array()}}},
-          {"error", {{"before", errors}, {"after", errors}}},
-          {"final", {{"batch_ls", {{"x", axis}, {"y", axis}, {"z", axis}}}}}}
-          .dump());
+  write_text(folder / "result.json", example_result(chain_head, K_xx, decision).dump());
   write_text(folder / "certificate.html", "<!doctype html><title>certificate</title>");
 }
 

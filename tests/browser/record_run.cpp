@@ -5,47 +5,31 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "storage/run_store.h"
 #include "tests/app/certificate_example.h"
+#include "tests/app/result_example.h"
 #include "tests/storage/store_fixture.h"
 
 namespace plumbline::app {
 namespace {
 
-using nlohmann::json;
-
 void write_result(const std::filesystem::path& folder, const std::string& chain_head,
                   const std::string& K_xx, const std::string& decision) {
-  json effects = json::array();
   CertificateExample crowded;
   crowded.add_effects(12);
   crowded.add_not_found();
   crowded.make_names_long();
+  std::vector<std::string> effects;
   for (const FoundEffect& effect : crowded.calibration.diagnosis.effects) {
-    effects.push_back({{"id", effect.id}});
+    effects.push_back(effect.id);
   }
-  const json axis = {{"K_V_per_g", {std::stod(K_xx), 0.001, 0.002}},
-                     {"U0_V", -2.5},
-                     {"u_K_V_per_g", {1e-5, 1e-5, 1e-5}},
-                     {"u_U0_V", 2e-5}};
-  const json errors = {{"heldout_pose_rms", {0.02, 0.01, 0.03}}};
-  const json result = {
-      {"provenance", {{"chain_head", chain_head}, {"created_utc", "2026-01-02T05:00:00Z"}}},
-      {"decision",
-       {{"status", decision},
-        {"limit_mps2", 0.2},
-        {"max_abs_error_mps2", 0.03},
-        {"u_mps2", 0.001}}},
-      {"diagnosis", {{"verdict", "partly_explained"}, {"reason", ""}, {"effects", effects}}},
-      {"error", {{"before", errors}, {"after", errors}}},
-      {"final", {{"batch_ls", {{"x", axis}, {"y", axis}, {"z", axis}}}}}};
   std::filesystem::create_directories(folder);
-  std::ofstream(folder / "result.json") << result.dump();
+  std::ofstream(folder / "result.json")
+      << example_result(chain_head, std::stod(K_xx), decision, effects).dump();
   std::ofstream(folder / "certificate.html") << crowded.html();
 }
 

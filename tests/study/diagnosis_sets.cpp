@@ -151,10 +151,6 @@ struct Yardstick {
   Eigen::VectorXd freed(const Eigen::VectorXd& means) const { return means - A * qr.solve(means); }
 };
 
-double rms_of(const Eigen::VectorXd& v) {
-  return v.norm() / std::sqrt(static_cast<double>(v.size()));
-}
-
 /// Size of an effect, see diagnosis.h: `with` and `without` are the same unit.
 double size_of(const MeasurementSet& with, const MeasurementSet& without, const Yardstick& yard,
                bool in_samples) {
@@ -170,7 +166,7 @@ double size_of(const MeasurementSet& with, const MeasurementSet& without, const 
       change_V = std::sqrt(change_V / static_cast<double>(a.size()));
     } else {
       change_V =
-          rms_of(yard.freed(mean_voltages(means_with, axis) - mean_voltages(means_without, axis)));
+          rms(yard.freed(mean_voltages(means_with, axis) - mean_voltages(means_without, axis)));
     }
     size = std::max(size, change_V / yard.noise_V[axis]);
   }

@@ -10,6 +10,7 @@
 #include "app/figure/plot.h"
 #include "app/figure/svg_canvas.h"
 #include "estimator/diagnosis/explain.h"
+#include "estimator/error_figures.h"
 #include "estimator/pose_means.h"
 #include "estimator/scalar/calibrate_scalar.h"
 #include "tests/study/recorded.h"
@@ -24,9 +25,7 @@ using app::SvgCanvas;
 namespace palette = app::palette;
 
 double rms_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value * value;
-  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+  return rms(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values)));
 }
 
 std::string mm(double value_mps2) { return fmt::format("{:.2f}", kMilli * value_mps2); }
