@@ -67,6 +67,7 @@ struct DetectionLimit {
   double best = 0;
   double worst = 0;
   std::string unit;
+  double sigmas = 0;  ///< by how many the effect stands out of what the final model leaves
 };
 
 /// Where a head can go.
@@ -99,6 +100,7 @@ struct FoundEffect {
   std::string separate_by;              ///< words
   SeparatingPlan separating_plan = {};  ///< no stops: nothing to decide, or poses do not decide it
   std::string definition = {};          ///< of an effect that a user described, as they wrote it
+  double sigmas = 0;  ///< the loss of fit without it, as that of a single Gaussian quantity
 };
 
 /// Structure that no listed effect explains.
@@ -110,6 +112,7 @@ struct UnlistedStructure {
   std::vector<EffectParameter> parameters;
   double p_value = 1;
   double heldout_gain = 0;
+  double sigmas = 0;  ///< as FoundEffect::sigmas
 };
 
 enum class Verdict { clean, explained, partly_explained, unexplained, undetermined };

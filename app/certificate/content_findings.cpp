@@ -194,8 +194,8 @@ void add_findings(const Composer& c) {
     add_effect_table(c);
     add_terms(c);
     add_alternatives(c);
-    c.add(evidence_figure({c.calibration, c.tr}));
   }
+  if (auto figure = evidence_figure({c.calibration, c.tr})) c.add(*std::move(figure));
   add_not_found(c);
 }
 

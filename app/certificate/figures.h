@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "app/certificate/document.h"
 #include "app/certificate/language.h"
@@ -29,7 +30,8 @@ Figure allan_figure(const FigureContext& context);
 Figure convergence_figure(const FigureContext& context);
 /// What the variance of each scale factor and offset is made of, as bars.
 Figure budget_figure(const FigureContext& context, const RunDescription& description);
-/// What each added effect removes of the excess error on left-out poses, with its p-value.
-Figure evidence_figure(const FigureContext& context);
+/// By how many standard deviations the ten strongest candidates stand out of the residual, those
+/// that were added to the model first; nothing when there was no search.
+std::optional<Figure> evidence_figure(const FigureContext& context);
 
 }  // namespace plumbline::app

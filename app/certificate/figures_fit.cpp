@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "app/certificate/budget.h"
@@ -198,10 +199,11 @@ Figure budget_figure(const FigureContext& context, const RunDescription& descrip
 
 namespace {
 
-struct Evidence {
+/// A candidate, and how strongly it stands out of the residual.
+struct Candidate {
   std::string name;
-  double gain = 0;
-  double p_value = 1;
+  double sigmas = 0;
+  bool added = false;
 };
 
 /// At most `most` characters; a picture cannot wrap.
@@ -214,49 +216,85 @@ std::string shortened(const std::string& text, std::size_t most) {
   return text;
 }
 
-std::vector<Evidence> evidence_of(const Diagnosis& diagnosis, const Translator& tr) {
-  std::vector<Evidence> list;
+/// All that were added to the model, then the strongest of the listed ones that were not, up to
+/// ten.
+std::vector<Candidate> strongest_candidates(const Diagnosis& diagnosis, const Translator& tr) {
+  constexpr std::size_t kMost = 10;
+  const auto candidate = [&](const std::string& name, const std::vector<std::size_t>& axes,
+                             double sigmas, bool added) {
+    return Candidate{shortened(axes.empty() ? name : name + " (" + axes_text(axes) + ")", 60),
+                     sigmas, added};
+  };
+  std::vector<Candidate> added, rest;
   for (const FoundEffect& e : diagnosis.effects) {
-    list.push_back({shortened(effect_name(e.id, tr) + " (" + axes_text(e.axes) + ")", 60),
-                    e.heldout_gain, e.p_value});
+    added.push_back(candidate(effect_name(e.id, tr), e.axes, e.sigmas, true));
   }
   for (const UnlistedStructure& u : diagnosis.unlisted) {
-    list.push_back({shortened(unlisted_name(u, tr) + " (" + axes_text(u.axes) + ")", 60),
-                    u.heldout_gain, u.p_value});
+    added.push_back(candidate(unlisted_name(u, tr), u.axes, u.sigmas, true));
   }
-  return list;
+  for (const DetectionLimit& limit : diagnosis.not_found) {
+    std::vector<std::size_t> axes;
+    if (limit.axis) axes.push_back(*limit.axis);
+    Candidate one = candidate(effect_name(limit.id, tr), axes, limit.sigmas, false);
+    // One entry a parameter, all with the strength of the whole.
+    const auto same = [&](const Candidate& c) { return c.name == one.name; };
+    if (std::none_of(rest.begin(), rest.end(), same)) rest.push_back(std::move(one));
+  }
+  const auto stronger = [](const Candidate& a, const Candidate& b) { return a.sigmas > b.sigmas; };
+  std::stable_sort(added.begin(), added.end(), stronger);
+  std::stable_sort(rest.begin(), rest.end(), stronger);
+  if (added.size() < kMost) {
+    rest.resize(std::min(rest.size(), kMost - added.size()));
+    added.insert(added.end(), rest.begin(), rest.end());
+  }
+  return added;
 }
 
 }  // namespace
 
-Figure evidence_figure(const FigureContext& context) {
-  constexpr double kLeft = 20, kBar = 12, kStep = 40, kTop = 8, kBarWidth = 480;
-  const std::vector<Evidence> list = evidence_of(context.calibration->diagnosis, context.tr);
+std::optional<Figure> evidence_figure(const FigureContext& context) {
+  constexpr double kLeft = 20, kRight = 60, kName = 14, kBar = 10, kStep = 32, kTop = 4, kLimit = 5;
+  const std::vector<Candidate> list =
+      strongest_candidates(context.calibration->diagnosis, context.tr);
+  if (list.empty()) return std::nullopt;
   Figure figure;
   figure.caption = context.tr(
-      "Evidence for the added effects: the share of the excess error on left-out poses that each "
-      "removes, and the probability of as much by noise alone.");
-  figure.description = context.tr("Bars of the evidence for each effect");
+      "Evidence of the candidates: by how many standard deviations each stands out of the "
+      "residual, on a logarithmic scale. "
+      "Dark: added to the model; light: the strongest of those that were not. Many hypotheses are "
+      "tried, so that noise alone gives some; the line stands at 5, which the limits of "
+      "detection refer to.");
+  figure.description = context.tr("Bars of the evidence for each candidate");
   figure.width = kFigureWidth;
-  figure.height = kTop + static_cast<double>(list.size()) * kStep + 22;
-  figure.draw = [context, list](Canvas& canvas) {
+  figure.height = kTop + static_cast<double>(list.size()) * kStep + 24;
+  figure.draw = [list](Canvas& canvas) {
+    // From one σ on; effects differ by orders of magnitude.
+    double most = 10;
+    for (const Candidate& c : list) most = std::max(most, c.sigmas);
+    const double decades = std::log10(most);
+    const auto x_of = [&](double sigmas) {
+      const double share = std::clamp(std::log10(std::max(sigmas, 1.0)) / decades, 0.0, 1.0);
+      return kLeft + share * (kFigureWidth - kLeft - kRight);
+    };
     double y = kTop;
-    for (const Evidence& e : list) {
-      const double share = std::isfinite(e.gain) ? std::clamp(e.gain, 0.0, 1.0) : 0;
-      canvas.text({kLeft, y + 10}, e.name, {11});
-      canvas.rectangle({kLeft, y + 16}, kBarWidth, kBar, "#eeeeee");
-      canvas.rectangle({kLeft, y + 16}, kBarWidth * share, kBar, palette::kBlue);
-      canvas.text({kLeft + kBarWidth + 10, y + 26},
-                  fmt::format("{:.0f} %   p {}", 100 * share,
-                              e.p_value < 1e-6 ? "< 10⁻⁶" : "= " + significant(e.p_value, 2)),
+    for (const Candidate& c : list) {
+      canvas.text({kLeft, y + kName - 3}, c.name, {11});
+      canvas.rectangle({kLeft, y + kName}, x_of(c.sigmas) - kLeft, kBar,
+                       c.added ? palette::kBlue : palette::kGrey);
+      canvas.text({x_of(c.sigmas) + 6, y + kName + kBar - 1}, significant(c.sigmas, 2) + " σ",
                   {11});
       y += kStep;
     }
-    for (int share = 0; share <= 100; share += 25) {
-      const double x = kLeft + kBarWidth * share / 100;
-      canvas.line({x, y - 10}, {x, y - 6}, {palette::kBlack, 0.7, {}});
-      canvas.text({x, y + 6}, fmt::format("{} %", share), {10, Anchor::middle});
+    // Beside the bars only, not through the names.
+    for (double top = kTop + kName; top < y; top += kStep) {
+      canvas.line({x_of(kLimit), top - 1}, {x_of(kLimit), top + kBar + 1},
+                  {palette::kBlack, 0.8, {}});
     }
+    for (double tick = 1; tick <= most; tick *= 10) {
+      canvas.line({x_of(tick), y}, {x_of(tick), y + 4}, {palette::kBlack, 0.7, {}});
+      canvas.text({x_of(tick), y + 16}, fmt::format("{:.0f}", tick), {10, Anchor::middle});
+    }
+    canvas.text({x_of(kLimit), y + 16}, "5", {10, Anchor::middle});
   };
   return figure;
 }

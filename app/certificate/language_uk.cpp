@@ -212,9 +212,7 @@ const Catalogue& catalogue() {
     {"the geometry of the head", "геометрія головки"},
     {"the readings within a dwell", "відліки в межах стоянки"},
     {"not among the listed effects: {} follows {}", "поза переліком ефектів: {} залежить від {}"},
-    {"Evidence for the added effects: the share of the excess error on left-out poses that each removes, and the probability of as much by noise alone.", "Підстави для доданих ефектів: частка надлишкової похибки поза оцінюванням, яку усуває кожен, та ймовірність такого через сам шум."},
-    {"Bars of the evidence for each effect", "Смуги підстав для кожного ефекту"},
-    {"Evidence of the candidates: by how many standard deviations each stands out of the residual. Dark: added to the model; light: the strongest of those that were not. Many hypotheses are tried, so that noise alone gives some; the broken line stands at 5, which the limits of detection refer to.", "Підстави для кандидатів: на скільки стандартних відхилень кожен виступає із залишку. Темні: додано до моделі; світлі: найсильніші з недоданих. Гіпотез перевірено багато, тож дещо дає й сам шум; штрихова лінія стоїть на 5, до чого належать межі виявлення."},
+    {"Evidence of the candidates: by how many standard deviations each stands out of the residual, on a logarithmic scale. Dark: added to the model; light: the strongest of those that were not. Many hypotheses are tried, so that noise alone gives some; the line stands at 5, which the limits of detection refer to.", "Підстави для кандидатів: на скільки стандартних відхилень кожен виступає із залишку, у логарифмічному масштабі. Темні: додано до моделі; світлі: найсильніші з недоданих. Гіпотез перевірено багато, тож дещо дає й сам шум; лінія стоїть на 5, до чого належать межі виявлення."},
     {"Bars of the evidence for each candidate", "Смуги підстав для кожного кандидата"},
     // --- pictures ---
     {"Figure {}. {}", "Рисунок {}. {}"},

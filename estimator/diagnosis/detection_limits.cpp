@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <tuple>
 #include <utility>
+
+#include "estimator/diagnosis/screening.h"
 
 namespace plumbline {
 namespace {
@@ -26,12 +30,19 @@ struct Amplitude {
   std::vector<double> limits;
 };
 
+/// An effect, and the axis that it acts on; nothing for the head.
+using Place = std::pair<std::string, std::optional<std::size_t>>;
+Place place_of(const Candidate& candidate) {
+  Place place{candidate.effect->id(), std::nullopt};
+  if (candidate.effect->subject() == Subject::sensor) place.second = candidate.axis;
+  return place;
+}
+
 DetectionLimit limit_of(const Candidate& candidate, const ParameterInfo& info,
                         std::vector<double> limits) {
   std::sort(limits.begin(), limits.end());
   DetectionLimit limit;
-  limit.id = candidate.effect->id();
-  if (candidate.effect->subject() == Subject::sensor) limit.axis = candidate.axis;
+  std::tie(limit.id, limit.axis) = place_of(candidate);
   limit.parameter = info.name;
   limit.unit = info.unit;
   limit.limit = limits[limits.size() / 2];
@@ -111,11 +122,18 @@ double sigmas(const CandidateGains& gains, std::size_t candidate) {
 std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
                                              const SearchResult& result) {
   const CandidateGains gains(result.responses, result.fit);
+  const Eigen::VectorXd gain = gains.of(result.fit.whitened_residual).col(0);
   std::vector<Amplitude> amplitudes;
   std::vector<Size> sizes;
+  std::map<Place, double> log_p;
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
     const Candidate& candidate = list.candidates[c];
     if (candidate.handicap > 0 || is_in_model(result, candidate)) continue;
+    if (const int dof = gains.dof(c); dof > 0) {
+      double& strongest = log_p[place_of(candidate)];
+      strongest =
+          std::min(strongest, log_chi_squared_tail(gain(static_cast<Eigen::Index>(c)), dof));
+    }
     const auto infos = candidate.effect->parameters();
     const auto has = [&](ParameterRole role) {
       return std::any_of(infos.begin(), infos.end(),
@@ -169,6 +187,7 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
     limits.push_back(
         limit_of(*size.first, size.first->effect->parameters().front(), {size.limit()}));
   }
+  for (DetectionLimit& limit : limits) limit.sigmas = sigmas_of(log_p[{limit.id, limit.axis}]);
   std::stable_sort(limits.begin(), limits.end(),
                    [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
   return limits;

@@ -218,12 +218,16 @@ void attach_gains(const std::vector<Evidence>& evidence, const std::vector<doubl
   std::size_t unlisted = 0;
   for (std::size_t e = 0; e < evidence.size() && e < gains.size(); ++e) {
     const Effect& effect = *evidence[e].candidate.effect;
+    const auto attach = [&](auto& entry) {
+      entry.heldout_gain = std::max(entry.heldout_gain, gains[e]);
+      entry.sigmas = std::max(entry.sigmas, evidence[e].sigmas);
+    };
     if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
-      diagnosis.unlisted[unlisted++].heldout_gain = gains[e];
+      attach(diagnosis.unlisted[unlisted++]);
       continue;
     }
     for (FoundEffect& entry : diagnosis.effects) {
-      if (entry.id == effect.id()) entry.heldout_gain = std::max(entry.heldout_gain, gains[e]);
+      if (entry.id == effect.id()) attach(entry);
     }
   }
 }

@@ -18,7 +18,8 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
 /// Adds the filter's estimate of the same model to every parameter, with E_n between them.
 void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosis& diagnosis);
 
-/// Adds the shares of the held-out excess that the effects remove, one for each evidence.
+/// Adds what speaks for each effect: the shares of the held-out excess that they remove, one for
+/// each evidence, and the losses of fit without them.
 void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
                   Diagnosis& diagnosis);
 

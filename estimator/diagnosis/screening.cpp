@@ -19,6 +19,16 @@ double log_chi_squared_tail(double x, double dof) {
   return (half - 1) * std::log(y) - y - std::lgamma(half) + std::log1p((half - 1) / y);
 }
 
+double sigmas_of(double log_p) {
+  // The tail lies below exp(−z²/2).
+  double low = 0, high = std::sqrt(std::max(0.0, -2 * log_p));
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (low + high);
+    (log_chi_squared_tail(middle * middle, 1) > log_p ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
 double effective_looks(const CandidateGains& gains_of, std::size_t candidates, Eigen::Index rows,
                        std::uint64_t seed, int replicates) {
   Eigen::MatrixXd noise(rows, replicates);

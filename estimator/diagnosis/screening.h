@@ -12,6 +12,9 @@ namespace plumbline {
 /// log of P(χ²_dof > x), also where the probability itself is no longer a double.
 double log_chi_squared_tail(double x, double dof);
 
+/// z with P(|Z| > z) of the standard normal distribution of this logarithm, ≤ 0.
+double sigmas_of(double log_p);
+
 /// How many independent looks a search amounts to: the best p-value of a search over pure noise
 /// (`rows` stacked rows, simulated `replicates` times) is that of the best of so many.
 double effective_looks(const CandidateGains& gains_of, std::size_t candidates, Eigen::Index rows,

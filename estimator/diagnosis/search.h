@@ -38,8 +38,8 @@ struct SearchInput {
 /// One effect in the model, and what speaks for it.
 struct Evidence {
   Candidate candidate;
-  double chi2_gain = 0;  ///< loss of fit when it alone is taken out of the final model
-  double p_value = 1;    ///< of the whole search
+  double p_value = 1;  ///< of the whole search
+  double sigmas = 0;   ///< FoundEffect::sigmas; 0 until the final model is known
 };
 
 struct SearchResult {

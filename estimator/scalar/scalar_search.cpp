@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "estimator/diagnosis/screening.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
@@ -270,7 +271,7 @@ ScalarSearchResult search_scalar(ScalarData& data, const ScalarSearchInput& inpu
     result.fit = fit_scalar(data, larger, result.noise.covariance);
     result.noise = noise_of(data, input, result.fit);
     result.fit = fit_scalar(data, result.fit.parameters, result.noise.covariance);
-    result.findings.push_back({candidate, p_value, 0, {}});
+    result.findings.push_back({candidate, p_value, sigmas_of(best.log_p), 0, {}});
   }
   drop_what_does_not_carry(data, input, result);
   for (std::size_t k = 0; k < result.findings.size(); ++k) {

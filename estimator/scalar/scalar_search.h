@@ -23,6 +23,7 @@ struct ScalarSearchInput {
 struct ScalarFinding {
   Candidate candidate;
   double p_value = 1;       ///< of the whole search
+  double sigmas = 0;        ///< the gain of fit when it joined, as that of one Gaussian quantity
   double heldout_gain = 0;  ///< share of the excess power on rests left out that it removes
   std::vector<std::string> alternatives;
 };

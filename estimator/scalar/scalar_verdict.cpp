@@ -66,7 +66,8 @@ void add_finding(const ScalarSearchResult& search, std::size_t index, Diagnosis&
                                   smooth->shape(),
                                   parameters,
                                   finding.p_value,
-                                  finding.heldout_gain});
+                                  finding.heldout_gain,
+                                  finding.sigmas});
     words +=
         "unlisted structure driven by " + smooth->driver() + " (" + kAxisName[active.axis] + ")";
     return;
@@ -74,6 +75,7 @@ void add_finding(const ScalarSearchResult& search, std::size_t index, Diagnosis&
   words += words_of(active.effect->id(), active.axis, parameters);
   FoundEffect found{active.effect->id(),  {active.axis},        parameters, finding.p_value,
                     finding.heldout_gain, finding.alternatives, {}};
+  found.sigmas = finding.sigmas;
   if (!found.alternatives.empty()) {
     found.separate_by =
         "readings at known angles (calibrate with the dividing head): without angles only the sum "

@@ -88,6 +88,7 @@ struct CertificateExample {
       effect.parameters = {{"k2", 0, 0.00212, 0.00011, "g/g^2"}, {"c", {}, -0.0123, 0.0004, "deg"}};
       effect.p_value = 1e-9;
       effect.heldout_gain = 0.9 / static_cast<double>(count);
+      effect.sigmas = 60 / static_cast<double>(k + 1);
       effect.alternatives = {"sensor.asymmetry", "rig.h_scale+rig.tilt_index"};
       effect.separate_by = "poses with h below the horizon";
       calibration.diagnosis.effects.push_back(effect);
@@ -101,6 +102,13 @@ struct CertificateExample {
       not_found.push_back({k % 3 == 0 ? "rig.delta_periodic" : "sensor.temperature_scale",
                            k % 3 == 0 ? std::vector<std::size_t>{} : std::vector<std::size_t>{0, 2},
                            "c", 0.00123 * static_cast<double>(k + 1), kUnits[k % 4]});
+    }
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      DetectionLimit limit;
+      limit.id = "sensor.temperature_scale";
+      limit.axis = axis;
+      limit.sigmas = 3.1 - static_cast<double>(axis);
+      calibration.diagnosis.not_found.push_back(limit);
     }
   }
 
