@@ -6,7 +6,6 @@
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/heldout.h"
-#include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/separation.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
@@ -144,10 +143,6 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
       const ActiveEffect removed = fewer.effects[k];
       fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
       EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening, fewer);
-      const auto freedom = std::count(removed.free.begin(), removed.free.end(), true);
-      found.evidence[k].sigmas = sigmas_of(
-          log_chi_squared_tail(without.chi2 - found.fit.chi2,
-                               static_cast<double>(std::max<std::ptrdiff_t>(1, freedom))));
       if (!without.determined) {
         gains.push_back(0);
         continue;

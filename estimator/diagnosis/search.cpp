@@ -463,8 +463,11 @@ class Search {
     SearchResult result;
     result.evidence.resize(chosen_.size());
     parallel_for(chosen_.size(), [&](std::size_t k) {
-      result.evidence[k] = {list_.candidates[chosen_[k]], fit_without({k}).chi2 - stage_.fit.chi2,
-                            p_values_[k]};
+      const std::vector<bool>& free = stage_.fit.parameters.effects[k].free;
+      const auto dof = std::max<std::ptrdiff_t>(1, std::count(free.begin(), free.end(), true));
+      const double lost = fit_without({k}).chi2 - stage_.fit.chi2;
+      result.evidence[k] = {list_.candidates[chosen_[k]], p_values_[k],
+                            sigmas_of(log_chi_squared_tail(lost, static_cast<double>(dof)))};
     });
     responses();
     result.responses = std::move(*responses_);

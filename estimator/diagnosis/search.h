@@ -39,7 +39,7 @@ struct SearchInput {
 struct Evidence {
   Candidate candidate;
   double p_value = 1;  ///< of the whole search
-  double sigmas = 0;   ///< FoundEffect::sigmas; 0 until the final model is known
+  double sigmas = 0;   ///< FoundEffect::sigmas, in the final model of the search
 };
 
 struct SearchResult {
