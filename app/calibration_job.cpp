@@ -56,22 +56,6 @@ bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limit
   return outcome.verification && !within_limits(*outcome.verification, limits).value_or(true);
 }
 
-/// One row for each parameter: the largest limit of the axes that show the effect at all.
-std::vector<NotFound> not_found_rows(const Diagnosis& diagnosis) {
-  std::vector<NotFound> rows;
-  for (const DetectionLimit& limit : diagnosis.not_found) {
-    if (!std::isfinite(limit.limit)) continue;
-    auto row = std::find_if(rows.begin(), rows.end(), [&](const NotFound& r) {
-      return r.id == limit.id && r.parameter == limit.parameter && r.unit == limit.unit;
-    });
-    if (row == rows.end())
-      row = rows.insert(rows.end(), {limit.id, {}, limit.parameter, 0, limit.unit});
-    if (limit.axis) row->axes.push_back(*limit.axis);
-    row->limit = std::max(row->limit, limit.limit);
-  }
-  return rows;
-}
-
 Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& outcome,
                            OutputFolder& folder) {
   Provenance provenance = job.provenance;
@@ -89,7 +73,6 @@ Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& 
       .result_sha256 = sha256(result),
       .started_utc = job.started_utc,
       .finished_utc = job.finished_utc,
-      .not_found = not_found_rows(outcome.calibration.diagnosis),
       .signing = job.style.signing ? &*job.style.signing : nullptr};
   if (auto done = write_certificate(certificate, folder); !done) return done;
   if (outcome.verification) {
@@ -178,12 +161,13 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   for (const storage::EventRecord& event : stored->events) {
     job.events.push_back({.t_s = event.t_s, .kind = event.kind, .text = event.text});
   }
+  const double end_s = job.events.empty() ? 0 : job.events.back().t_s;
   for (const std::string& column : stored->left_out) {
     job.events.push_back(
-        {.t_s = 0, .kind = "left out", .text = column + ": not recorded throughout"});
+        {.t_s = end_s, .kind = "left out", .text = column + ": not recorded throughout"});
   }
   if (summary.state != storage::RunState::finished) {
-    job.events.push_back({.t_s = 0,
+    job.events.push_back({.t_s = end_s,
                           .kind = kIncomplete,
                           .text = fmt::format("the run is not finished: {} after {} poses",
                                               storage::to_string(summary.state), summary.poses)});

@@ -19,15 +19,6 @@ struct CertificateEvent {
   std::string text;
 };
 
-/// An effect that was looked for and not found, and how large it would have had to be.
-struct NotFound {
-  std::string id;
-  std::vector<std::size_t> axes;  ///< empty: all
-  std::string parameter;
-  double limit = 0;
-  std::string unit;
-};
-
 struct SigningKey;
 struct ScalarResults;
 
@@ -42,7 +33,6 @@ struct CertificateInput {
   std::string result_sha256 = {};  ///< of result.json; empty: not printed
   std::string started_utc = {};    ///< of a stored run; empty: not known
   std::string finished_utc = {};
-  std::vector<NotFound> not_found = {};
   const SigningKey* signing = nullptr;  ///< signs the XML; none: it is not signed
   /// A calibration without angles; `calibration` is then shared_chapters() of it.
   const ScalarResults* scalar = nullptr;

@@ -103,15 +103,39 @@ void add_alternatives(const Composer& c) {
   c.add(std::move(facts));
 }
 
-/// Names of what was searched for are in the catalogue of effects; their limits come with the
-/// diagnosis when it states them.
+/// An effect that was looked for and not found, and how large it would have had to be.
+struct NotFound {
+  std::string id;
+  std::vector<std::size_t> axes;  ///< empty: the head's
+  std::string parameter;
+  double limit = 0;
+  std::string unit;
+};
+
+/// One row for each parameter: the largest limit of the axes that show the effect at all.
+std::vector<NotFound> not_found_rows(const Diagnosis& diagnosis) {
+  std::vector<NotFound> rows;
+  for (const DetectionLimit& limit : diagnosis.not_found) {
+    if (!std::isfinite(limit.limit)) continue;
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const NotFound& r) {
+      return r.id == limit.id && r.parameter == limit.parameter && r.unit == limit.unit;
+    });
+    if (row == rows.end())
+      row = rows.insert(rows.end(), {limit.id, {}, limit.parameter, 0, limit.unit});
+    if (limit.axis) row->axes.push_back(*limit.axis);
+    row->limit = std::max(row->limit, limit.limit);
+  }
+  return rows;
+}
+
 void add_not_found(const Composer& c) {
-  if (c.input.not_found.empty()) return;
+  const std::vector<NotFound> rows = not_found_rows(c.input.calibration.diagnosis);
+  if (rows.empty()) return;
   Table table;
   table.caption = c.tr("Looked for and not found: an effect of this size would have been seen");
   table.header = {c.tr("effect"), c.tr("axes"), c.tr("parameter"), c.tr("detection limit")};
   table.word_columns = {1, 2};
-  for (const NotFound& item : c.input.not_found) {
+  for (const NotFound& item : rows) {
     const std::string unit = printed_unit(item.unit);
     table.rows.push_back({effect_name(item.id, c.tr),
                           item.axes.empty() ? "–" : axes_text(item.axes), item.parameter,

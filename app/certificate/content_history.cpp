@@ -12,6 +12,13 @@ namespace plumbline::app::content {
 
 namespace {
 
+/// "recovering: why" after the event that says why.
+bool repeats(const CertificateEvent& event, const CertificateEvent& before) {
+  constexpr std::string_view kRecovering = "recovering: ";
+  return event.kind == "state" && event.text.starts_with(kRecovering) &&
+         before.text.ends_with(std::string_view(event.text).substr(kRecovering.size()));
+}
+
 /// A run has a thousand changes of state; what a reader looks for is what was out of the ordinary.
 struct Told {
   std::vector<CertificateEvent> events;
@@ -32,7 +39,9 @@ bool is_routine(const CertificateEvent& event) {
 Told told_events(const std::vector<CertificateEvent>& events) {
   Told told;
   std::map<std::string, std::size_t> seen;
-  for (const CertificateEvent& event : events) {
+  for (std::size_t k = 0; k < events.size(); ++k) {
+    const CertificateEvent& event = events[k];
+    if (k > 0 && repeats(event, events[k - 1])) continue;
     if (is_routine(event)) {
       ++told.routine;
     } else if (++seen[event.kind] > kMostOfAKind) {
@@ -81,12 +90,15 @@ void add_history(const Composer& c) {
   table.header = {c.tr("time, s"), c.tr("kind"), c.tr("what happened")};
   table.word_columns = {1, 2};
   for (const CertificateEvent& event : told.events) {
-    table.rows.push_back({significant(event.t_s, 5), event.kind, c.tr.phrase(event.text)});
+    // What a person wrote stays as it was written.
+    const bool own_words = event.kind == "operator";
+    table.rows.push_back({significant(event.t_s, 5), c.tr.phrase(event.kind),
+                          own_words ? event.text : c.tr.phrase(event.text)});
   }
   if (!table.rows.empty()) c.add(std::move(table));
   for (const auto& [kind, count] : told.further) {
-    c.add(Paragraph{
-        c.tr("Further events of the kind “{}” that are kept with the run: {}.", kind, count)});
+    c.add(Paragraph{c.tr("Further events of the kind “{}” that are kept with the run: {}.",
+                         c.tr.phrase(kind), count)});
   }
   if (told.routine > 0) {
     c.add(

@@ -60,14 +60,18 @@ std::string Translator::phrase(std::string_view english) const {
   if (language_ == Language::en) return std::string(english);
   constexpr std::string_view kBetween = "; ";
   const std::size_t end = english.find(kBetween);
-  for (const auto& [pattern, own] : ukrainian_phrases()) {
-    // A clause is a unit; only what is known to be longer is taken together.
-    if (end != std::string_view::npos && pattern.find(kBetween) == std::string_view::npos) continue;
-    const auto values = holes(pattern, english);
-    if (!values) continue;
-    fmt::dynamic_format_arg_store<fmt::format_context> store;
-    for (const std::string_view value : *values) store.push_back(phrase(value));
-    return fmt::vformat(own, store);
+  for (const auto& phrases : {ukrainian_phrases(), ukrainian_event_phrases()}) {
+    for (const auto& [pattern, own] : phrases) {
+      // A clause is a unit; only what is known to be longer is taken together.
+      if (end != std::string_view::npos && pattern.find(kBetween) == std::string_view::npos) {
+        continue;
+      }
+      const auto values = holes(pattern, english);
+      if (!values) continue;
+      fmt::dynamic_format_arg_store<fmt::format_context> store;
+      for (const std::string_view value : *values) store.push_back(phrase(value));
+      return fmt::vformat(own, store);
+    }
   }
   if (end == std::string_view::npos) return std::string(english);
   return phrase(english.substr(0, end)) + std::string(kBetween) +

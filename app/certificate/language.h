@@ -31,8 +31,8 @@ class Translator {
   std::string operator()(std::string_view english, const Values&... values) const {
     return fmt::format(fmt::runtime((*this)(english)), values...);
   }
-  /// What the core says of its own accord (reasons, remarks, proposals), clause by clause, with its
-  /// values in place; English where no phrase fits.
+  /// What the core, the sequencer and the rig say of their own accord (reasons, remarks, events),
+  /// clause by clause, with their values in place; English where no phrase fits.
   std::string phrase(std::string_view english) const;
   /// English texts that were asked for and not found so far, for a test.
   const std::set<std::string>& missing() const { return *missing_; }
@@ -44,7 +44,9 @@ class Translator {
 
 /// The Ukrainian text for an English one; empty when there is none.
 std::string_view ukrainian(std::string_view english);
-/// Sentences with `{}` for their values, in the order in which they are to be tried.
+/// Clauses with `{}` for their values, in the order in which they are to be tried: of the core, and
+/// then of the events of a run.
 std::span<const std::pair<std::string_view, std::string_view>> ukrainian_phrases();
+std::span<const std::pair<std::string_view, std::string_view>> ukrainian_event_phrases();
 
 }  // namespace plumbline::app

@@ -21,6 +21,7 @@ Calibration shared_chapters(const ScalarCalibration& scalar) {
   calibration.before = scalar.before;
   calibration.after = scalar.after;
   calibration.floor_pose_rms_mps2 = scalar.floor_pose_rms_mps2;
+  calibration.u_floor_pose_rms_mps2 = scalar.u_floor_pose_rms_mps2;
   calibration.noise = scalar.noise;
   // What refers an output to its input.
   for (Eigen::Index i = 0; i < 3; ++i) {

@@ -15,13 +15,6 @@ namespace {
 constexpr double kSigmas = 5;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-bool is_in_model(const SearchResult& result, const Candidate& candidate) {
-  return std::any_of(result.evidence.begin(), result.evidence.end(), [&](const Evidence& e) {
-    return e.candidate.effect == candidate.effect &&
-           (candidate.effect->subject() == Subject::head || e.candidate.axis == candidate.axis);
-  });
-}
-
 /// Limits of one amplitude over the hypotheses of one family.
 struct Amplitude {
   const Candidate* first = nullptr;
@@ -113,26 +106,25 @@ struct Size {
   }
 };
 
-double sigmas(const CandidateGains& gains, std::size_t candidate) {
-  return gains.dof(candidate) == 0 ? 0 : 1 / gains.transform(candidate)(0, 0);
+/// Of an effect without amplitude.
+double size_sigmas(const Eigen::MatrixXd& transform) {
+  return transform.rows() == 0 ? 0 : 1 / transform(0, 0);
 }
 
 }  // namespace
 
-std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
-                                             const SearchResult& result) {
-  const CandidateGains gains(result.responses, result.fit);
-  const Eigen::VectorXd gain = gains.of(result.fit.whitened_residual).col(0);
+std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
+  const CandidateList& list = beside.list;
   std::vector<Amplitude> amplitudes;
   std::vector<Size> sizes;
   std::map<Place, double> log_p;
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
     const Candidate& candidate = list.candidates[c];
-    if (candidate.handicap > 0 || is_in_model(result, candidate)) continue;
-    if (const int dof = gains.dof(c); dof > 0) {
+    if (candidate.handicap > 0 || beside.is_in_model(candidate)) continue;
+    const Eigen::MatrixXd transform = beside.transform(c);
+    if (transform.rows() > 0) {
       double& strongest = log_p[place_of(candidate)];
-      strongest =
-          std::min(strongest, log_chi_squared_tail(gain(static_cast<Eigen::Index>(c)), dof));
+      strongest = std::min(strongest, beside.log_p(c));
     }
     const auto infos = candidate.effect->parameters();
     const auto has = [&](ParameterRole role) {
@@ -140,12 +132,12 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
                          [&](const ParameterInfo& info) { return info.role == role; });
     };
     if (has(ParameterRole::amplitude)) {
-      add_amplitudes(candidate, gains.transform(c), amplitudes);
+      add_amplitudes(candidate, transform, amplitudes);
     } else if (infos.front().role == ParameterRole::shape && infos.size() == 1) {
       if (sizes.empty() || sizes.back().first->effect != candidate.effect ||
           sizes.back().first->axis != candidate.axis)
         sizes.push_back({&candidate, {}});
-      sizes.back().course.emplace_back(candidate.hypothesis.p.front(), sigmas(gains, c));
+      sizes.back().course.emplace_back(candidate.hypothesis.p.front(), size_sigmas(transform));
     }
   }
 
@@ -175,12 +167,9 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
       }
     }
     if (owner.empty()) break;
-    const CandidateResponses closer_responses =
-        candidate_responses(input.log, closer, result.whitening, result.fit.parameters);
-    const CandidateGains closer_gains(closer_responses, result.fit);
+    const std::vector<double> closer_sigmas = beside.sigmas(closer);
     for (std::size_t c = 0; c < owner.size(); ++c)
-      owner[c]->course.emplace_back(closer.candidates[c].hypothesis.p.front(),
-                                    sigmas(closer_gains, c));
+      owner[c]->course.emplace_back(closer.candidates[c].hypothesis.p.front(), closer_sigmas[c]);
   }
   for (Size& size : sizes) {
     size.sort();
@@ -191,6 +180,34 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
   std::stable_sort(limits.begin(), limits.end(),
                    [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
   return limits;
+}
+
+std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
+                                             const SearchResult& result) {
+  const CandidateGains gains(result.responses, result.fit);
+  const Eigen::VectorXd gain = gains.of(result.fit.whitened_residual).col(0);
+  return detection_limits(
+      {list,
+       [&](const Candidate& candidate) {
+         return std::any_of(result.evidence.begin(), result.evidence.end(), [&](const Evidence& e) {
+           return e.candidate.effect == candidate.effect &&
+                  (candidate.effect->subject() == Subject::head ||
+                   e.candidate.axis == candidate.axis);
+         });
+       },
+       [&](std::size_t c) { return gains.transform(c); },
+       [&](std::size_t c) {
+         return log_chi_squared_tail(gain(static_cast<Eigen::Index>(c)), gains.dof(c));
+       },
+       [&](const CandidateList& closer) {
+         const CandidateResponses responses =
+             candidate_responses(input.log, closer, result.whitening, result.fit.parameters);
+         const CandidateGains closer_gains(responses, result.fit);
+         std::vector<double> sigmas;
+         for (std::size_t c = 0; c < closer.candidates.size(); ++c)
+           sigmas.push_back(size_sigmas(closer_gains.transform(c)));
+         return sigmas;
+       }});
 }
 
 }  // namespace plumbline

@@ -1,11 +1,25 @@
 // How large each effect that was not found would have had to be.
 #pragma once
 
+#include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "estimator/diagnosis/search.h"
 
 namespace plumbline {
+
+/// The hypotheses of a search beside its final model, to first order.
+struct BesideModel {
+  const CandidateList& list;
+  std::function<bool(const Candidate&)> is_in_model;
+  /// As CandidateGains::transform(): dof × columns, no rows for what the model absorbs.
+  std::function<Eigen::MatrixXd(std::size_t candidate)> transform;
+  /// How likely its gain is by itself in noise alone.
+  std::function<double(std::size_t candidate)> log_p;
+  /// By how many σ each of further hypotheses without amplitude stands out.
+  std::function<std::vector<double>(const CandidateList&)> sigmas;
+};
 
 /// For every named effect that is not in the model, axis by axis: the amplitude that is 5 standard
 /// uncertainties in the final model, with the final noise, estimated together with everything in
@@ -13,6 +27,7 @@ namespace plumbline {
 /// which its response stands out as much. Beside it, by how many σ the effect's best hypothesis
 /// stands out of what the final model leaves: the best of many, so that noise alone gives some.
 /// First order in amplitudes.
+std::vector<DetectionLimit> detection_limits(const BesideModel& beside);
 std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
                                              const SearchResult& result);
 

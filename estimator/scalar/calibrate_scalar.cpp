@@ -179,6 +179,8 @@ Result<ScalarCalibration> calibrate_scalar(const ScalarInput& input,
   result.after =
       found ? figures_of(final_fit, final_covariance, final_direction, rests) : result.before;
   decide_scalar_verdict({search, inner, data.log, noise.scatter_gain}, result);
+  result.diagnosis.not_found =
+      scalar_detection_limits(data, candidates, final_fit, final_covariance);
 
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const Eigen::VectorXd share = direction.col(static_cast<Eigen::Index>(i)).cwiseAbs2();

@@ -99,6 +99,22 @@ Eigen::MatrixXd ScalarDirections::basis(std::size_t candidate) const {
   return basis_.middleCols(first_[candidate], dof_[candidate]);
 }
 
+Eigen::MatrixXd ScalarDirections::transform(const Candidate& candidate, std::size_t index) const {
+  const std::vector<std::size_t>& amplitudes = amplitude_[index];
+  const Eigen::Index count = std::max<Eigen::Index>(std::ssize(amplitudes), 1);
+  // What depends on the others stands for no amplitude of its own.
+  if (dof_[index] < count) return Eigen::MatrixXd(0, count);
+  Eigen::MatrixXd columns = columns_.middleCols(first_column_[index], count);
+  const ActiveEffect active = candidate.active();
+  for (std::size_t k = 0; k < amplitudes.size(); ++k) {
+    columns.col(static_cast<Eigen::Index>(k)) *= active.p[amplitudes[k]];
+  }
+  const Eigen::MatrixXd triangle = basis(index).transpose() * columns;
+  return triangle.triangularView<Eigen::Upper>()
+      .solve(Eigen::MatrixXd::Identity(count, count))
+      .transpose();
+}
+
 ActiveEffect ScalarDirections::started(const Candidate& candidate,
                                        const Eigen::VectorXd& whitened_residual,
                                        std::size_t index) const {

@@ -26,6 +26,8 @@ class ScalarDirections {
   Eigen::VectorXd project(const Eigen::VectorXd& whitened) const;
   /// n × dof.
   Eigen::MatrixXd basis(std::size_t candidate) const;
+  /// As CandidateGains::transform(): its columns, at the hypothesis, to the basis; dof × columns.
+  Eigen::MatrixXd transform(const Candidate& candidate, std::size_t index) const;
   /// The candidate with amplitudes that fit this whitened residual to first order.
   ActiveEffect started(const Candidate& candidate, const Eigen::VectorXd& whitened_residual,
                        std::size_t index) const;

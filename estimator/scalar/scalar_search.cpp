@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/screening.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
@@ -279,6 +280,39 @@ ScalarSearchResult search_scalar(ScalarData& data, const ScalarSearchInput& inpu
         scalar_alternatives(data, list, result.fit, result.noise.covariance, k);
   }
   return result;
+}
+
+std::vector<DetectionLimit> scalar_detection_limits(const ScalarData& data,
+                                                    const CandidateList& list, const ScalarFit& fit,
+                                                    const Eigen::MatrixXd& covariance) {
+  const ScalarDirections directions(data, list, fit, covariance);
+  const Eigen::VectorXd projected = directions.project(fit.whitened_residual);
+  const Eigen::VectorXd gain = directions.gains(projected);
+  const double total = projected.squaredNorm();
+  const auto free_dof = static_cast<double>(fit.residual_mps2.size() - fit.jacobian.cols());
+  return detection_limits(
+      {list,
+       [&](const Candidate& candidate) {
+         return std::any_of(fit.parameters.effects.begin(), fit.parameters.effects.end(),
+                            [&](const ActiveEffect& active) {
+                              return active.effect == candidate.effect &&
+                                     active.axis == candidate.axis;
+                            });
+       },
+       [&](std::size_t c) { return directions.transform(list.candidates[c], c); },
+       [&](std::size_t c) {
+         const double own = gain(static_cast<Eigen::Index>(c)), dof = directions.dof(c);
+         return log_f_tail(own, dof, total - own, free_dof - dof);
+       },
+       [&](const CandidateList& closer) {
+         const ScalarDirections beside(data, closer, fit, covariance);
+         std::vector<double> sigmas;
+         for (std::size_t c = 0; c < closer.candidates.size(); ++c) {
+           const Eigen::MatrixXd transform = beside.transform(closer.candidates[c], c);
+           sigmas.push_back(transform.rows() == 0 ? 0 : 1 / transform(0, 0));
+         }
+         return sigmas;
+       }});
 }
 
 }  // namespace plumbline

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/calibrate.h"
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/error_figures.h"
 #include "estimator/scalar/scalar_fit.h"
@@ -46,6 +47,12 @@ CandidateList scalar_candidates(const VisitLog& log);
 ScalarSearchResult search_scalar(ScalarData& data, const ScalarSearchInput& input,
                                  const ScalarFit& start, const CandidateList& list,
                                  std::uint64_t seed);
+
+/// As detection_limits(), for the one residual of a set without angles: what its rests would have
+/// shown at 5 standard uncertainties beside the final model, with the final noise.
+std::vector<DetectionLimit> scalar_detection_limits(const ScalarData& data,
+                                                    const CandidateList& list, const ScalarFit& fit,
+                                                    const Eigen::MatrixXd& covariance);
 
 /// Ten stretches of time, and the eight octants of attitude.
 Blocks scalar_time_blocks(std::size_t rests);

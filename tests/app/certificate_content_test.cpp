@@ -189,11 +189,15 @@ TEST(Certificate, TellsWhatWasOutOfTheOrdinaryAndCountsTheRest) {
 
 TEST(Certificate, WhatWasLookedForAndNotFound) {
   CertificateExample example;
-  CertificateInput input = example.input();
-  input.not_found = {{"rig.backlash", {}, "w", 0.0123, "deg"}};
-  const std::string html = write_html(make_certificate(input));
+  example.calibration.diagnosis.not_found = {
+      {.id = "rig.backlash", .axis = {}, .parameter = "w", .limit = 0.0123, .unit = "deg"},
+      {.id = "sensor.cubic", .axis = 0, .parameter = "k3", .limit = 0.002, .unit = "g/g^3"},
+      {.id = "sensor.cubic", .axis = 2, .parameter = "k3", .limit = 0.004, .unit = "g/g^3"}};
+  const std::string html = example.html();
   EXPECT_THAT(html, HasSubstr("Looked for and not found"));
   EXPECT_THAT(html, HasSubstr("<td class=\"words\">w</td><td>0.012°</td>"));
+  EXPECT_THAT(html, HasSubstr("<td class=\"words\">x, z</td><td class=\"words\">k3</td>"
+                              "<td>0.0040 g/g³</td>"));
 }
 
 TEST(Certificate, UkrainianLeavesNothingUntranslated) {
@@ -276,6 +280,48 @@ TEST(Certificate, UkrainianForWhatTheCoreSays) {
                       "rig.backlash by 7.1 standard deviations"),
             "подальші положення у випадковому порядку (кількість 3, h від 10° до 40°) відрізнять "
             "його від rig.backlash на 7.1 стандартних відхилень");
+}
+
+// What the sequencer and the rig write into a run; the operators' own words stay as they are.
+TEST(Certificate, UkrainianForTheEventsOfARun) {
+  CertificateExample example;
+  example.language = Language::uk;
+  example.events = {
+      {0, "operator", "both axes"},
+      {0, "state", "idle: waiting for the sensor and the drive"},
+      {0, "identity", "drive 0000-7AB7, node 2718"},
+      {47, "settle_cap",
+       "pose 9 (grid) at δ = 80.0000°, h = 0.0000°: not at rest after 10 s; sampled all the same"},
+      {60, "retry",
+       "pose 2 (grid) at δ = 10.0000°, h = 0.0000°, attempt 1 of 3: the head has not arrived at δ "
+       "= 10.0000°, h = 0.0000° within 6.6 s; it stands at δ = 8.7720°, h = 0.0000°"},
+      {60, "state",
+       "recovering: the head has not arrived at δ = 10.0000°, h = 0.0000° within 6.6 s; it stands "
+       "at δ = 8.7720°, h = 0.0000°"},
+      {70, "retry",
+       "homing, attempt 1 of 3: spindle (delta) axis: tcp:127.0.0.1:502 unit 1: no reply within "
+       "0.5 s: is "
+       "the drive on, is the unit id right?"},
+      {80, "fault", "the drive starts with an alarm (δ 66h soft limit, h no alarm); reset"},
+      {90, "suspend", "temp_C = 31.2 is outside 18 to 30"},
+      {95, "state", "stopping: stopped on request"}};
+  const std::string html = example.html();
+  for (const char* text :
+       {"<td class=\"words\">оператор</td><td class=\"words\">both axes</td>",
+        "очікування: очікування давача та привода", "привод 0000-7AB7, вузол 2718",
+        "положення 9 (сітка) при δ = 80.0000°, h = 0.0000°: немає спокою через 10 s; відліки взято "
+        "все одно",
+        "положення 2 (сітка) при δ = 10.0000°, h = 0.0000°, спроба 1 з 3: головка не дійшла до δ = "
+        "10.0000°, h = 0.0000° за 6.6 s; вона стоїть на δ = 8.7720°, h = 0.0000°",
+        "пошук нуля, спроба 1 з 3: вісь шпинделя (δ): tcp:127.0.0.1:502, пристрій 1: немає "
+        "відповіді за "
+        "0.5 s: чи ввімкнено привод, чи правильний його номер?",
+        "привод починає з аварійним сигналом (δ 66h програмне обмеження, h немає); скинуто",
+        "temp_C = 31.2 поза межами від 18 до 30", "зупинення: зупинено на вимогу"}) {
+    EXPECT_THAT(html, HasSubstr(text));
+  }
+  // What the event before has said is not said again.
+  EXPECT_THAT(html, Not(HasSubstr("відновлення роботи")));
 }
 
 // What the core says and the catalogue repeats: whoever changes one, changes the other.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "app/certificate/certificate.h"
+#include "app/certificate/scalar_results.h"
 
 namespace plumbline::app {
 
@@ -99,15 +100,14 @@ struct CertificateExample {
   void add_not_found() {
     static constexpr const char* kUnits[] = {"g/g^2", "deg", "g/K", "s"};
     for (std::size_t k = 0; k < 45; ++k) {
-      not_found.push_back({k % 3 == 0 ? "rig.delta_periodic" : "sensor.temperature_scale",
-                           k % 3 == 0 ? std::vector<std::size_t>{} : std::vector<std::size_t>{0, 2},
-                           "c", 0.00123 * static_cast<double>(k + 1), kUnits[k % 4]});
-    }
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      DetectionLimit limit;
-      limit.id = "sensor.temperature_scale";
-      limit.axis = axis;
-      limit.sigmas = 3.1 - static_cast<double>(axis);
+      const auto number = static_cast<double>(k + 1);
+      DetectionLimit limit{.id = k % 3 == 0 ? "rig.delta_periodic" : "sensor.temperature_scale",
+                           .axis = {},
+                           .parameter = "c" + std::to_string(k),
+                           .limit = 0.00123 * number,
+                           .unit = kUnits[k % 4],
+                           .sigmas = 3 / number};
+      if (k % 3 != 0) limit.axis = k % 3;
       calibration.diagnosis.not_found.push_back(limit);
     }
   }
@@ -134,16 +134,63 @@ struct CertificateExample {
   }
 
   CertificateInput input() const {
-    return {description,   calibration, provenance, &verification, events, laboratory, language,
-            result_sha256, {},          {},         not_found};
+    return {description, calibration, provenance, &verification,
+            events,      laboratory,  language,   result_sha256};
   }
   std::string html() const { return write_html(make_certificate(input())); }
 
   std::vector<CertificateEvent> events;
-  std::vector<NotFound> not_found;
   Laboratory laboratory;
   Language language = Language::en;
   std::string result_sha256 = std::string(64, '7');
+};
+
+/// The same for a calibration without angles.
+struct ScalarExample {
+  CertificateExample common;
+  ScalarCalibration calibration;
+  ScalarSource source{
+      "one rest for each number in the column pose", "LSB", {"ax_raw", "ay_raw", "az_raw"}};
+
+  ScalarExample() {
+    calibration.intervals = 40;
+    calibration.samples = 8000;
+    calibration.estimate.value << 32000, 32010, 31990, 0.0024, 0.0023, 0.0025, 0.001, -0.002, 0.003;
+    calibration.estimate.covariance.diagonal() << 0.01, 0.02, 0.03, 1e-14, 2e-14, 3e-14, 1e-9, 2e-9,
+        3e-9;
+    calibration.final = calibration.estimate;
+    calibration.before = calibration.after = common.calibration.after;
+    calibration.floor_pose_rms_mps2 = common.calibration.floor_pose_rms_mps2;
+    calibration.diagnosis = common.calibration.diagnosis;
+    for (auto& noise : calibration.noise) noise.source = "bursts at the poses";
+    for (int k = 0; k < 40; ++k) {
+      RestResult rest;
+      rest.t_mean_s = 10.0 * k;
+      rest.residual_before_mps2 = 0.03 * std::sin(1.3 * k);
+      rest.residual_after_mps2 = 0.02 * std::sin(1.7 * k);
+      calibration.rests.push_back(rest);
+    }
+  }
+
+  /// As CertificateExample::add_effects() and add_not_found().
+  void add_findings() {
+    common.add_effects(2);
+    common.add_not_found();
+    calibration.diagnosis = common.calibration.diagnosis;
+    calibration.decision = {DecisionStatus::conditional_pass, 0.2, 0.19, 0.01, 0.02, ""};
+  }
+
+  /// The document alone: what an input refers to lives no longer than this call.
+  Document document() const {
+    const Calibration shared = shared_chapters(calibration);
+    const ScalarResults results{calibration, source};
+    CertificateInput input{common.description, shared, common.provenance, nullptr, common.events};
+    input.laboratory = common.laboratory;
+    input.language = common.language;
+    input.result_sha256 = common.result_sha256;
+    input.scalar = &results;
+    return make_certificate(input);
+  }
 };
 
 }  // namespace plumbline::app

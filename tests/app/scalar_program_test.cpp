@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "tests/app/dcc_numbers.h"
 #include "tests/app/json_schema.h"
 #include "tests/app/program.h"
 #include "tests/app/temp_folder.h"
@@ -18,15 +19,17 @@ using testing::HasSubstr;
 
 constexpr double kG = 9.81;
 
-/// Counts of a triad with offset 32000 and 0.0024 m/s² per count, 40 attitudes, `columns` named.
-std::string rows(bool with_pose, const std::string& header) {
+/// Counts of a triad with offset 32000 and 0.0024 m/s² per count, 40 attitudes, `columns` named;
+/// `k2_g_per_g2` of axis x is what the nine parameters lack.
+std::string rows(bool with_pose, const std::string& header, double k2_g_per_g2 = 0) {
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
   std::string text = header + "\n";
   int row = 0;
   for (int k = 0; k < 40; ++k) {
     const double z = 2 * (k + 0.5) / 40 - 1, r = std::sqrt(1 - z * z), turn = 2.4 * k;
-    const double a[] = {kG * r * std::cos(turn), kG * r * std::sin(turn), kG * z};
+    double a[] = {kG * r * std::cos(turn), kG * r * std::sin(turn), kG * z};
+    a[0] += k2_g_per_g2 * a[0] * a[0] / 9.80665;
     for (int i = 0; i < (with_pose ? 200 : 400); ++i, ++row) {
       text += fmt::format("{:.2f},", 0.01 * row);
       if (with_pose) text += fmt::format("{},", k);
@@ -108,6 +111,24 @@ TEST(ScalarProgram, CertificateOfALaboratory) {
   const auto bad = verify();
   EXPECT_EQ(bad.exit_code, 1);
   EXPECT_THAT(bad.out, HasSubstr("FAILED XML and result.json agree in bias"));
+}
+
+TEST(ScalarProgram, XmlHasTheNumbersOfResultJson) {
+  for (const double k2 : {0.0, 0.02}) {
+    const TempFolder folder;
+    write_text(folder / "s.csv", rows(true, "t_s,pose,ax_raw,ay_raw,az_raw", k2));
+    const auto all = arguments(folder, {"--columns", "x=ax_raw,y=ay_raw,z=az_raw"});
+    write_text(folder / "run.toml", text_of(folder / "run.toml") +
+                                        "u_mps2 = 0.0001\n[limits]\nmax_abs_error_mps2 = 0.5\n");
+    ASSERT_EQ(run_plumbline(all).exit_code, 0);
+    const std::string result = text_of(folder / "out" / "result.json");
+    const auto diagnosis = nlohmann::json::parse(result).at("diagnosis");
+    EXPECT_EQ(diagnosis.at("effects").size(), k2 > 0 ? 1U : 0U) << diagnosis.dump(1);
+    EXPECT_GT(diagnosis.at("detection_limits").size(), 10U);
+    expect_numbers_of_result(text_of(folder / "out" / "certificate.xml"), result);
+    EXPECT_THAT(text_of(folder / "out" / "certificate.html"),
+                HasSubstr("Looked for and not found"));
+  }
 }
 
 TEST(ScalarProgram, ContinuousRecordIsCutIntoRests) {

@@ -14,10 +14,12 @@
 #include <functional>
 #include <iterator>
 #include <memory>
+#include <regex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "app/certificate/language.h"
 #include "app/config/rig_description.h"
 #include "app/sequencer/session.h"
 #include "app/sequencer/simulated_rig.h"
@@ -68,7 +70,32 @@ class SequencerRun : public testing::Test {
     folder_ = pattern;
     configure(kSmallRig);
   }
-  void TearDown() override { fs::remove_all(folder_); }
+  void TearDown() override {
+    expect_events_in_ukrainian();
+    fs::remove_all(folder_);
+  }
+
+  /// Whatever these runs made the sequencer and the rig say, a Ukrainian certificate says in
+  /// Ukrainian: no two English words in a row are left.
+  void expect_events_in_ukrainian() {
+    const auto store = storage::RunStore::open_read_only(database());
+    if (!store) return;
+    const auto runs = store->runs();
+    ASSERT_TRUE(runs.has_value()) << runs.error().message;
+    const Translator uk(Language::uk);
+    const std::regex english("\\b[a-z]{2,} [a-z]{2,}\\b");
+    for (const storage::RunSummary& run : *runs) {
+      const auto events = store->events(run.id);
+      ASSERT_TRUE(events.has_value()) << events.error().message;
+      for (const storage::EventRecord& event : *events) {
+        // From pose to pose as planned: no certificate lists them.
+        const bool routine = std::regex_search(event.text, std::regex("^(mov|settl|sampl)ing: "));
+        if (event.kind == "operator" || routine) continue;
+        EXPECT_NE(uk.phrase(event.kind), event.kind);
+        EXPECT_FALSE(std::regex_search(uk.phrase(event.text), english)) << uk.phrase(event.text);
+      }
+    }
+  }
 
   void configure(const std::string& text) {
     auto rig = parse_rig_description(text, "rig.toml");

@@ -18,8 +18,10 @@
 #include "app/certificate/dcc/dcc_writer.h"
 #include "app/certificate/dcc/signature.h"
 #include "app/certificate/fingerprint.h"
+#include "app/io/result_json.h"
 #include "app/verify/dcc_reader.h"
 #include "tests/app/certificate_example.h"
+#include "tests/app/dcc_numbers.h"
 #include "tests/app/example_set.h"
 #include "tests/app/program.h"
 #include "tests/app/temp_folder.h"
@@ -66,6 +68,18 @@ std::string replaced(std::string text, const std::string& from, const std::strin
 
 // --- the digital certificate by itself ---
 
+TEST(Dcc, HasTheNumbersOfResultJsonHoweverManyThereAre) {
+  CertificateExample full;
+  full.add_effects(12);
+  full.make_names_long();
+  full.add_not_found();
+  full.calibration.decision = {DecisionStatus::conditional_pass, 0.2, 0.19, 0.01, 0.02, "a rule"};
+  CertificateInput input = full.input();
+  input.verification = nullptr;  // of evaluation.json
+  expect_numbers_of_result(write_dcc(input, make_certificate(input), {}),
+                           result_json(full.calibration, full.provenance).dump());
+}
+
 TEST(Dcc, KeepsSchemaAndRulesInEveryForm) {
   const bool schema = !schema_folder().empty();
   CertificateExample plain;
@@ -74,6 +88,7 @@ TEST(Dcc, KeepsSchemaAndRulesInEveryForm) {
   CertificateExample full;
   full.add_effects(12);
   full.make_names_long();
+  full.add_not_found();
   full.language = Language::uk;
   full.laboratory.received = full.laboratory.performed_from = "2026-01-30";
   full.calibration.decision = {DecisionStatus::conditional_pass, 0.2, 0.19, 0.01, 0.02, "a rule"};
@@ -391,35 +406,23 @@ TEST_F(Verify, SameInputGivesTheSameFiles) {
 }
 
 TEST_F(Verify, XmlHasTheNumbersOfResultJson) {
-  const auto json = nlohmann::json::parse(read("result.json"));
-  const auto dcc = read_dcc(read("certificate.xml"), "certificate.xml");
-  ASSERT_TRUE(dcc);
-  for (const char* axis : kAxisName) {
-    const auto& row = json["final"]["batch_ls"][axis];
-    const XmlList* native = dcc->list("K_" + std::string(axis) + "x", dsi::kVoltPerG);
-    const XmlList* si = dcc->list("K_" + std::string(axis) + "x", dsi::kSensitivity);
-    ASSERT_TRUE(native != nullptr && si != nullptr);
-    EXPECT_EQ(native->values, row["K_V_per_g"].get<std::vector<double>>());
-    for (std::size_t j = 0; j < 3; ++j) {
-      EXPECT_DOUBLE_EQ(native->expanded[j], 2 * row["u_K_V_per_g"][j].get<double>());
-      EXPECT_DOUBLE_EQ(si->values[j], native->values[j] / kStandardGravity_mps2);
-    }
-  }
-  // Noise, as the same terms.
-  static constexpr std::pair<const char*, const char*> kTerms[] = {
-      {"Q", "\\volt\\second"},
-      {"N", "\\volt\\second\\tothe{0.5}"},
-      {"B", "\\volt"},
-      {"K", "\\volt\\second\\tothe{-0.5}"},
-      {"R", "\\volt\\second\\tothe{-1}"}};
-  for (const auto& [term, unit] : kTerms) {
-    const XmlList* list = dcc->list(std::string(term) + "_x", unit);
-    ASSERT_NE(list, nullptr) << term;
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const auto& stated = json["noise"][kAxisName[i]][term];
-      EXPECT_EQ(list->values[i], stated["value"].get<double>()) << term << kAxisName[i];
-      EXPECT_EQ(list->expanded[i], 2 * stated["u"].get<double>()) << term << kAxisName[i];
-    }
+  expect_numbers_of_result(read("certificate.xml"), read("result.json"));
+}
+
+// With an effect that was added, others that were not found, and a decision.
+TEST_F(Verify, XmlHasTheNumbersOfResultJsonWithEffectsAndDecision) {
+  ExampleSet set;
+  set.quadratic_g_per_g2 = 0.05;
+  set.write(folder_.path());
+  write_text(folder_ / "run.toml", example_run_toml() + "[limits]\nmax_abs_error_mps2 = 0.5\n");
+  for (const char* language : {"en", "uk"}) {
+    calibrate(language, {"--language", language});
+    const fs::path out = folder_ / language;
+    const std::string result = text_of(out / "result.json");
+    EXPECT_THAT(result, HasSubstr("\"id\": \"sensor.quadratic\""));
+    EXPECT_THAT(result, HasSubstr("\"status\": \"pass\""));
+    expect_numbers_of_result(text_of(out / "certificate.xml"), result);
+    EXPECT_EQ(verify(out).exit_code, 0);
   }
 }
 

@@ -110,6 +110,29 @@ TEST(Scalar, NamesANonlinearityAndLowersTheErrorOnRestsLeftOut) {
   EXPECT_NE(diagnosis.effects[0].separate_by, "");
 }
 
+TEST(Scalar, StatesHowLargeAnEffectWouldHaveBeenSeen) {
+  const auto limit_of = [](const ScalarCalibration& calibration, const std::string& id,
+                           std::size_t axis) {
+    for (const DetectionLimit& limit : calibration.diagnosis.not_found) {
+      if (limit.id == id && limit.axis == axis) return limit.limit;
+    }
+    return 0.0;
+  };
+  const auto clean = calibrate_scalar({tumble(80, 5, nothing), at_local_gravity()}, {});
+  const auto curved = calibrate_scalar({tumble(80, 5, quadratic_y), at_local_gravity()}, {});
+  ASSERT_TRUE(clean && curved);
+  // The same attitudes and the same noise: 5 standard uncertainties of what was found there.
+  const double limit = limit_of(*clean, "sensor.quadratic", 1);
+  EXPECT_NEAR(limit, 5 * curved->diagnosis.effects.at(0).parameters.at(0).u, 0.1 * limit);
+  // What is in the model is no longer looked for; the other axes are.
+  EXPECT_EQ(limit_of(*curved, "sensor.quadratic", 1), 0);
+  EXPECT_NEAR(limit_of(*curved, "sensor.quadratic", 2), limit, limit);
+  // Sizes without amplitude: a triad that clips at its largest reading shows it.
+  EXPECT_NEAR(limit_of(*clean, "sensor.saturation", 0), 1, 0.1);
+  EXPECT_GT(limit_of(*clean, "sensor.dead_zone", 0), 1e-5);
+  EXPECT_LT(limit_of(*clean, "sensor.dead_zone", 0), 1e-2);
+}
+
 TEST(Scalar, SaysTooMuchWhenTheCauseIsNotToBeFound) {
   // From rest to rest at random: a triad that was not held still.
   const Extra restless = [](const Eigen::Vector3d& a_g, double k) -> Eigen::Vector3d {

@@ -232,14 +232,14 @@ void add_scalar(const Context& c, const XmlElement& results) {
       units.factor, units.bias);
   add(dcc_ref::kScale, c.tr("Scale of the axes x, y, z"), 3, {"scale_x", "scale_y", "scale_z"},
       1 / units.factor, units.scale);
-  add("plumbline_nonorthogonality", c.tr("Non-orthogonality"), 6,
+  add(dcc_ref::kNonorthogonality, c.tr("Non-orthogonality"), 6,
       {"angle_yz", "angle_zy", "angle_zx"}, 1, "\\radian");
 }
 
 void add_sensor_terms(const Context& c, const XmlElement& results) {
   const SensorTerms terms = sensor_terms(c.input.calibration.final.batch_ls);
   const XmlElement data =
-      add_result(c, results, "plumbline_ieee1293", c.tr("Terms of IEEE Std 1293"));
+      add_result(c, results, dcc_ref::kIeee1293, c.tr("Terms of IEEE Std 1293"));
   const auto add = [&](const char* ref_type, const std::string& name, const Series& si) {
     const XmlElement quantity = add_quantity(c, data, ref_type, name);
     add_list(quantity, si);
@@ -270,7 +270,7 @@ void add_sensor_terms(const Context& c, const XmlElement& results) {
   add("plumbline_K0", c.tr("bias K0"), scaled(K0, kStandardGravity_mps2, dsi::kAcceleration));
   add("plumbline_misalignment", c.tr("misalignment of the input axes"),
       scaled(tilt, 1, "\\radian"));
-  add("plumbline_nonorthogonality", c.tr("angle between input axes less 90 degrees"),
+  add(dcc_ref::kNonorthogonality, c.tr("angle between input axes less 90 degrees"),
       scaled(between, 1, "\\radian"));
 }
 
@@ -318,42 +318,81 @@ const char* conformity(DecisionStatus status) {
 
 void add_errors(const Context& c, const XmlElement& results) {
   const Calibration& calibration = c.input.calibration;
-  const XmlElement data = add_result(c, results, "plumbline_error",
+  const XmlElement data = add_result(c, results, dcc_ref::kError,
                                      c.tr("Input-referred errors of the calibrated model"));
-  const auto add = [&](const char* ref_type, const std::string& name,
-                       const PerAxis<double>& values) {
-    const XmlElement quantity = add_quantity(c, data, ref_type, name);
-    add_list(quantity, {{"x", "y", "z"}, {values.begin(), values.end()}, {}, dsi::kAcceleration});
+  const auto add = [&](const std::string& ref_type, const std::string& name,
+                       const PerAxis<double>& values, const PerAxis<double>* u = nullptr) {
+    const XmlElement quantity = add_quantity(c, data, ("plumbline_" + ref_type).c_str(), name);
+    Series series{{"x", "y", "z"}, {values.begin(), values.end()}, {}, dsi::kAcceleration};
+    if (u != nullptr) series.u.assign(u->begin(), u->end());
+    add_list(quantity, series);
     used_method(c, quantity);
   };
-  add("plumbline_heldoutRmsBefore", c.tr("RMS of the pose means left out of the fit, before"),
-      calibration.before.heldout_pose_rms_mps2);
-  add("plumbline_heldoutRmsAfter", c.tr("RMS of the pose means left out of the fit, after"),
-      calibration.after.heldout_pose_rms_mps2);
-  add("plumbline_heldoutMaxAfter", c.tr("largest pose mean left out of the fit, after"),
-      calibration.after.heldout_pose_max_abs_mps2);
-  add("plumbline_floorRms", c.tr("expected RMS of the pose means from the noise alone"),
-      calibration.floor_pose_rms_mps2);
-  if (c.input.verification != nullptr) {
-    add("plumbline_freshRmsAfter", c.tr("RMS of the pose means, fresh verification poses"),
-        c.input.verification->after.pose_rms_mps2);
+  const auto both = [&](const std::string& ref_type, const std::string& name,
+                        const PerAxis<double>& before, const PerAxis<double>& after) {
+    add(ref_type + "Before", c.tr("{}, before", name), before);
+    add(ref_type + "After", c.tr("{}, after", name), after);
+  };
+  const ErrorFigures& b = calibration.before;
+  const ErrorFigures& a = calibration.after;
+  both("fitRms", c.tr("RMS of the pose means, fitted poses"), b.fit_pose_rms_mps2,
+       a.fit_pose_rms_mps2);
+  both("heldoutRms", c.tr("RMS of the pose means, poses left out of the fit"),
+       b.heldout_pose_rms_mps2, a.heldout_pose_rms_mps2);
+  both("heldoutMax", c.tr("largest pose mean, poses left out of the fit"),
+       b.heldout_pose_max_abs_mps2, a.heldout_pose_max_abs_mps2);
+  both("sampleRms", c.tr("RMS of single readings"), b.sample_rms_mps2, a.sample_rms_mps2);
+  add("floorRms", c.tr("expected RMS of the pose means from the noise alone"),
+      calibration.floor_pose_rms_mps2, &calibration.u_floor_pose_rms_mps2);
+  if (const Evaluation* fresh = c.input.verification; fresh != nullptr) {
+    both("freshRms", c.tr("RMS of the pose means, fresh verification poses"),
+         fresh->before.pose_rms_mps2, fresh->after.pose_rms_mps2);
+    both("freshMax", c.tr("largest pose mean, fresh verification poses"),
+         fresh->before.pose_max_abs_mps2, fresh->after.pose_max_abs_mps2);
+  }
+}
+
+/// What was looked for and not found, axis by axis.
+void add_detection_limits(const Context& c, const XmlElement& results) {
+  const std::vector<DetectionLimit>& limits = c.input.calibration.diagnosis.not_found;
+  if (limits.empty()) return;
+  const XmlElement data =
+      add_result(c, results, dcc_ref::kDetectionLimit,
+                 c.tr("Looked for and not found: an effect of this size would have been seen"));
+  for (const DetectionLimit& limit : limits) {
+    // What these poses do not show at all has no limit.
+    if (!std::isfinite(limit.limit)) continue;
+    std::string name =
+        fmt::format("{} ({}): {}", effect_name(limit.id, c.tr), limit.id, limit.parameter);
+    if (limit.axis) name += fmt::format(" ({})", kAxisName.at(*limit.axis));
+    const XmlElement quantity = add_quantity(c, data, dcc_ref::kDetectionLimit, name);
+    if (const auto unit = dsi_unit(limit.unit)) {
+      add_real(quantity, limit.parameter, unit->factor * limit.limit, 0, unit->unit);
+    } else {
+      c.text(quantity, "dcc:noQuantity", number(limit.limit) + " " + limit.unit);
+    }
+    used_method(c, quantity);
   }
 }
 
 void add_decision(const Context& c, const XmlElement& results) {
   const Decision decision = stated_decision(c.input.calibration.decision, c.input.events);
   if (decision.status == DecisionStatus::none) return;
-  const XmlElement quantity = add_quantity(
-      c, add_result(c, results, "plumbline_conformity", c.tr("Statement of conformity")),
-      "basic_measurementError", c.tr("largest error of a pose left out of the fit"));
+  const XmlElement quantity =
+      add_quantity(c, add_result(c, results, dcc_ref::kConformity, c.tr("Statement of conformity")),
+                   "basic_measurementError", c.tr("largest error of a pose left out of the fit"));
   add_real(quantity, "", decision.max_abs_error_mps2, decision.u_mps2, dsi::kAcceleration);
   used_method(c, quantity);
   const XmlElement meta = quantity.add("dcc:measurementMetaData").add("dcc:metaData");
   meta.attribute("refType", "basic_conformity");
   meta.add("dcc:conformity", conformity(decision.status));
-  const XmlElement limit = meta.add("dcc:data").add("dcc:quantity");
+  const XmlElement data = meta.add("dcc:data");
+  const XmlElement limit = data.add("dcc:quantity");
   limit.attribute("refType", "basic_acceptanceLimitUpper");
   add_real(limit, "", decision.limit_mps2, 0, dsi::kAcceleration);
+  const XmlElement guard = data.add("dcc:quantity");
+  guard.attribute("refType", "plumbline_guardBand");
+  add_real(guard, "", decision.guard_band_mps2, 0, dsi::kAcceleration);
 }
 
 void add_noise(const Context& c, const XmlElement& results) {
@@ -364,7 +403,7 @@ void add_noise(const Context& c, const XmlElement& results) {
   if (std::all_of(noise.begin(), noise.end(), [](const auto& n) { return n.source == "none"; })) {
     return;
   }
-  const XmlElement data = add_result(c, results, "plumbline_noise", c.tr("Noise"));
+  const XmlElement data = add_result(c, results, dcc_ref::kNoise, c.tr("Noise"));
   for (std::size_t term = 0; term < kTermCount; ++term) {
     Series series{{}, {}, {}, kUnit[term]};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -373,7 +412,7 @@ void add_noise(const Context& c, const XmlElement& results) {
       series.values.push_back(value.value);
       series.u.push_back(value.u);
     }
-    const XmlElement quantity = add_quantity(c, data, "plumbline_noise", kTermName[term]);
+    const XmlElement quantity = add_quantity(c, data, dcc_ref::kNoise, kTermName[term]);
     add_list(quantity, series);
     used_method(c, quantity);
   }
@@ -397,6 +436,7 @@ void add_measurement_results(const Context& c, const XmlElement& root) {
     add_sensor_terms(c, results);
   }
   add_effects(c, results);
+  add_detection_limits(c, results);
   add_errors(c, results);
   add_decision(c, results);
   if (!scalar) add_noise(c, results);

@@ -14,7 +14,7 @@ struct Siblings {
   std::string pdf_pages_sha256;  ///< pdf_file.h: pages without attachments
 };
 
-/// refTypes of the identifications that carry hashes ("sha256:…").
+/// refTypes: of the identifications that carry hashes ("sha256:…"), then of results.
 namespace dcc_ref {
 inline constexpr const char* kSelf = "plumbline_documentSha256";
 inline constexpr const char* kWords = "plumbline_wordsSha256";
@@ -30,7 +30,13 @@ inline constexpr const char* kSensitivity = "plumbline_sensitivity";
 inline constexpr const char* kOffset = "plumbline_offset";
 inline constexpr const char* kBias = "plumbline_bias";
 inline constexpr const char* kScale = "plumbline_scale";
+inline constexpr const char* kNonorthogonality = "plumbline_nonorthogonality";
+inline constexpr const char* kIeee1293 = "plumbline_ieee1293";
 inline constexpr const char* kEffect = "plumbline_effect";
+inline constexpr const char* kDetectionLimit = "plumbline_detectionLimit";
+inline constexpr const char* kError = "plumbline_error";
+inline constexpr const char* kConformity = "plumbline_conformity";
+inline constexpr const char* kNoise = "plumbline_noise";
 }  // namespace dcc_ref
 
 /// What the XSD demands and was not stated carries these: a country code for private use, and

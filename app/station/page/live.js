@@ -122,7 +122,9 @@ function board() {
   fact("remaining", status ? clock(status.remaining_s) : "");
   fact("temperature", typeof temp === "number" ? `${temp.toFixed(2)} °C` : "");
   fact("alarms", status ? alarmWords(status) : "");
-  id("progress").value = status ? status.progress : phase === "finished" || phase === "calculating" ? 1 : 0;
+  // How far a run came that ended early is not known here: no bar rather than an empty one.
+  id("progress").hidden = !status && phase !== "finished" && phase !== "calculating";
+  id("progress").value = status ? status.progress : 1;
   const box = id("verdict");
   box.hidden = !verdict;
   if (verdict) {
