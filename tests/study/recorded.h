@@ -33,6 +33,8 @@ struct StillRecords {
 Result<std::string> rest_page(const RestRecord& record);
 std::string still_page(const StillRecords& records);
 
+/// mm/s² of m/s².
+std::string mm(double value_mps2);
 /// Frame of a page and a table; the first row is the head.
 std::string html_page(const std::string& title, const std::string& body);
 std::string html_table(const std::vector<std::vector<std::string>>& rows);

@@ -21,6 +21,8 @@ std::string html_page(const std::string& title, const std::string& body) {
       title, body);
 }
 
+std::string mm(double value_mps2) { return fmt::format("{:.2f}", kMilli * value_mps2); }
+
 std::string html_table(const std::vector<std::vector<std::string>>& rows) {
   std::string html = "<table>";
   for (std::size_t row = 0; row < rows.size(); ++row) {

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -27,8 +28,6 @@ namespace palette = app::palette;
 double rms_of(const std::vector<double>& values) {
   return rms(Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values)));
 }
-
-std::string mm(double value_mps2) { return fmt::format("{:.2f}", kMilli * value_mps2); }
 
 RunDescription description_of(const RestRecord& record) {
   RunDescription description;
@@ -114,16 +113,39 @@ double angle_deg(const RestResult& a, const RestResult& b) {
   return std::acos(std::clamp(a.direction.dot(b.direction), -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
+/// Pairs of rests so far apart in attitude and in order.
+struct PairClass {
+  const char* name;
+  double from_deg, to_deg;
+  std::size_t from_apart, to_apart;
+};
+constexpr double kAny = 181;
+constexpr std::size_t kEver = 1U << 30U;
+
+/// How much the residuals of such pairs differ: RMS / √2, which is their own RMS when they have
+/// nothing in common.
+struct PairScatter {
+  std::size_t pairs = 0;
+  double before_mps2 = 0;
+  double after_mps2 = 0;
+};
+PairScatter scatter_of(const std::vector<RestResult>& rests, const PairClass& c) {
+  std::vector<double> before, after;
+  for (std::size_t i = 0; i < rests.size(); ++i) {
+    for (std::size_t j = i + c.from_apart; j < std::min(rests.size(), i + c.to_apart); ++j) {
+      const double angle = angle_deg(rests[i], rests[j]);
+      if (angle < c.from_deg || angle >= c.to_deg) continue;
+      before.push_back(rests[i].residual_before_mps2 - rests[j].residual_before_mps2);
+      after.push_back(rests[i].residual_after_mps2 - rests[j].residual_after_mps2);
+    }
+  }
+  if (before.empty()) return {};
+  return {before.size(), rms_of(before) / std::numbers::sqrt2, rms_of(after) / std::numbers::sqrt2};
+}
+
 /// Do rests that are alike in attitude, or close in time, have like residuals?
 std::string likeness_table(const std::vector<RestResult>& rests) {
-  struct Class {
-    const char* name;
-    double from_deg, to_deg;
-    std::size_t from_apart, to_apart;
-  };
-  constexpr double kAny = 181;
-  constexpr std::size_t kEver = 1U << 30U;
-  static constexpr Class kClasses[] = {
+  static constexpr PairClass kClasses[] = {
       {"next to each other, less than 6° apart", 0, 6, 1, 2},
       {"less than 6° apart, others between them", 0, 6, 2, kEver},
       {"6 to 15° apart", 6, 15, 1, kEver},
@@ -132,41 +154,76 @@ std::string likeness_table(const std::vector<RestResult>& rests) {
       {"next to each other, whatever the attitude", 0, kAny, 1, 2}};
   std::vector<std::vector<std::string>> rows = {
       {"pairs of rests", "pairs", "RMS difference / √2 before, mm/s²", "after"}};
-  for (const Class& c : kClasses) {
-    std::vector<double> before, after;
-    for (std::size_t i = 0; i < rests.size(); ++i) {
-      for (std::size_t j = i + c.from_apart; j < std::min(rests.size(), i + c.to_apart); ++j) {
-        const double angle = angle_deg(rests[i], rests[j]);
-        if (angle < c.from_deg || angle >= c.to_deg) continue;
-        before.push_back(rests[i].residual_before_mps2 - rests[j].residual_before_mps2);
-        after.push_back(rests[i].residual_after_mps2 - rests[j].residual_after_mps2);
-      }
-    }
-    if (before.empty()) continue;
-    rows.push_back({c.name, std::to_string(before.size()), mm(rms_of(before) / std::numbers::sqrt2),
-                    mm(rms_of(after) / std::numbers::sqrt2)});
+  for (const PairClass& c : kClasses) {
+    const PairScatter scatter = scatter_of(rests, c);
+    if (scatter.pairs == 0) continue;
+    rows.push_back(
+        {c.name, std::to_string(scatter.pairs), mm(scatter.before_mps2), mm(scatter.after_mps2)});
   }
   return html_table(rows);
 }
 
-/// Is the residual larger where the rest is restless inside?
-std::string quietness_table(std::vector<RestResult> rests) {
+/// A third of the rests, by how restless they are inside.
+struct Third {
+  double expected_mps2 = 0;  ///< from the scatter inside
+  double before_mps2 = 0;
+  double after_mps2 = 0;
+};
+std::array<Third, 3> thirds_of(std::vector<RestResult> rests) {
   std::sort(rests.begin(), rests.end(), [](const RestResult& a, const RestResult& b) {
     return a.expected_mps2 < b.expected_mps2;
   });
-  std::vector<std::vector<std::string>> rows = {
-      {"rests", "expected from the scatter inside, mm/s² RMS", "residual before", "after"}};
-  static constexpr const char* kThird[] = {"quietest third", "middle third", "most restless third"};
-  for (std::size_t third = 0; third < 3; ++third) {
+  std::array<Third, 3> thirds;
+  for (std::size_t third = 0; third < thirds.size(); ++third) {
     std::vector<double> expected, before, after;
     for (std::size_t k = third * rests.size() / 3; k < (third + 1) * rests.size() / 3; ++k) {
       expected.push_back(rests[k].expected_mps2);
       before.push_back(rests[k].residual_before_mps2);
       after.push_back(rests[k].residual_after_mps2);
     }
-    rows.push_back({kThird[third], mm(rms_of(expected)), mm(rms_of(before)), mm(rms_of(after))});
+    thirds[third] = {rms_of(expected), rms_of(before), rms_of(after)};
+  }
+  return thirds;
+}
+
+/// Is the residual larger where the rest is restless inside?
+std::string quietness_table(const std::array<Third, 3>& thirds) {
+  static constexpr const char* kName[] = {"quietest third", "middle third", "most restless third"};
+  std::vector<std::vector<std::string>> rows = {
+      {"rests", "expected from the scatter inside, mm/s² RMS", "residual before", "after"}};
+  for (std::size_t third = 0; third < thirds.size(); ++third) {
+    rows.push_back({kName[third], mm(thirds[third].expected_mps2), mm(thirds[third].before_mps2),
+                    mm(thirds[third].after_mps2)});
   }
   return html_table(rows);
+}
+
+/// What can drive the rest of the residual, and what cannot.
+std::string exclusions(const ScalarCalibration& c, const std::array<Third, 3>& thirds) {
+  constexpr double kAlike = 0.8;  // of the scatter of pairs that have nothing in common
+  const PairScatter any = scatter_of(c.rests, {"", 45, kAny, 1, kEver});
+  const PairScatter near = scatter_of(c.rests, {"", 0, 15, 1, kEver});
+  const PairScatter neighbours = scatter_of(c.rests, {"", 0, kAny, 1, 2});
+  const bool by_attitude = near.pairs > 0 && near.after_mps2 < kAlike * any.after_mps2;
+  const bool by_time = neighbours.after_mps2 < kAlike * any.after_mps2;
+  const bool by_noise = thirds[0].after_mps2 < kAlike * thirds[2].after_mps2;
+  std::string text = fmt::format(
+      "Pairs more than 45° apart scatter by {} mm/s² (RMS difference / √2). ", mm(any.after_mps2));
+  text += fmt::format("Those within 15° of each other scatter by {}: {}. ", mm(near.after_mps2),
+                      by_attitude ? "part of the rest follows the attitude"
+                                  : "no function of the attitude can drive the rest");
+  text += fmt::format("Neighbours in time scatter by {}: {}. ", mm(neighbours.after_mps2),
+                      by_time ? "part of the rest drifts" : "no drift does, either");
+  text += fmt::format("The quietest third is off by {} where its own scatter leaves {}: {}. ",
+                      mm(thirds[0].after_mps2), mm(thirds[0].expected_mps2),
+                      by_noise ? "the noise inside the rests has a part in it"
+                               : "nor is it the noise inside the rests");
+  if (!by_attitude && !by_time && !by_noise) {
+    text +=
+        "What is left is scatter from rest to rest: the sensor, or the way it lay, did not repeat. "
+        "Nothing that was recorded tells which.";
+  }
+  return "<p>" + text + "</p>\n";
 }
 
 std::string figure(const char* id, const std::string& words, const std::string& x_label,
@@ -260,6 +317,7 @@ Result<std::string> rest_page(const RestRecord& record) {
     body += figure(("a_" + axis).c_str(), "Residuals against a_" + axis, "a_" + axis + " / g",
                    c.rests, [i](const RestResult& rest) { return rest.direction(i); });
   }
+  const std::array<Third, 3> thirds = thirds_of(c.rests);
   body +=
       "<h2>What drives the rest?</h2>\n<p>What follows the attitude makes rests that are alike in "
       "attitude alike in their residuals, whenever they were; what drifts makes neighbours alike. "
@@ -267,7 +325,7 @@ Result<std::string> rest_page(const RestRecord& record) {
       likeness_table(c.rests) +
       "<p>Were the rests with more scatter inside the worse ones, the noise would be to "
       "blame:</p>\n" +
-      quietness_table(c.rests);
+      quietness_table(thirds) + "<h2>In words</h2>\n" + exclusions(c, thirds);
   return html_page(record.title, body);
 }
 
