@@ -225,13 +225,19 @@ class Search {
   }
 
   /// A slow effect that the noise was estimated without is partly taken for slow noise, and then
-  /// hides in it. So the noise is estimated once more, beside all that is slow; where that is
-  /// clearly better, the candidates are compared by the likelihood of each with its own noise.
+  /// hides in it. So the noise is estimated once more, beside all that is slow, and the candidates
+  /// are compared by the likelihood of each with its own noise: where that is clearly better beside
+  /// few functions of time, and where there is noise to hide in, beside any course of time.
   bool add_slow_one() {
-    if (add_slow_one(slow_functions(input_.log))) return true;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      if (has_slow_noise(axis)) return add_slow_one(any_course_of_time(input_.log));
-    return false;
+    constexpr double kWorthALook = 1e-3;
+    const auto better = [](std::size_t, double p_of_all) { return p_of_all < kWorthALook; };
+    if (add_slow_one(slow_functions(input_.log), better)) return true;
+    PerAxis<bool> slow_noise{};
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) slow_noise[axis] = has_slow_noise(axis);
+    if (slow_noise == PerAxis<bool>{}) return false;
+    // So many functions are seldom better as a whole, even if one of them is the truth.
+    const auto room = [&](std::size_t axis, double) { return slow_noise[axis]; };
+    return add_slow_one(any_course_of_time(input_.log), room);
   }
 
   /// Whether there is slow noise in which an effect could hide.
@@ -247,10 +253,10 @@ class Search {
     return slow_V2 > kOfFast * fast_V2;
   }
 
-  /// `beside`: what is slow, n × any number.
-  bool add_slow_one(const Eigen::MatrixXd& beside) {
+  /// `beside`: what is slow, n × any number; worth_a_look(axis, p-value of all of it together).
+  template <typename WorthALook>
+  bool add_slow_one(const Eigen::MatrixXd& beside, const WorthALook& worth_a_look) {
     constexpr std::size_t kRefined = 4;
-    constexpr double kWorthALook = 1e-3;
     const EnlargedParameters& model = stage_.fit.parameters;
     const Stage rich = settle_noise(input_, model, {{}, &stage_.noise, nullptr}, beside);
     Before before{{}, &stage_.noise, &rich};
@@ -258,14 +264,13 @@ class Search {
     for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
       if (!rich.coarse[axis]) before.known[axis] = &stage_.noise[axis];
     const PerAxis<PooledNoise> plain = settle_noise(input_, model, before).noise;
-    PerAxis<bool> worth_a_look{};
+    PerAxis<bool> looked_at{};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const double gain = plain[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
-      worth_a_look[i] =
-          chi_squared_tail(std::max(0.0, gain), static_cast<double>(beside.cols())) < kWorthALook;
+      looked_at[i] = worth_a_look(
+          i, chi_squared_tail(std::max(0.0, gain), static_cast<double>(beside.cols())));
     }
-    if (std::none_of(worth_a_look.begin(), worth_a_look.end(), [](bool b) { return b; }))
-      return false;
+    if (looked_at == PerAxis<bool>{}) return false;
     const EnlargedFit rich_fit = fit_enlarged(input_.log, rich.observed, rich.whitening, model);
     const CandidateResponses beside_slow =
         candidate_responses(input_.log, list_, rich.whitening, rich_fit.parameters);
@@ -274,7 +279,7 @@ class Search {
     const Eigen::MatrixXd slow = orthonormal_basis(beside);
     std::erase_if(ranked, [&](const Scored& s) {
       const Candidate& c = list_.candidates[s.candidate];
-      return c.effect->subject() == Subject::head || !worth_a_look[c.axis] ||
+      return c.effect->subject() == Subject::head || !looked_at[c.axis] ||
              std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c) ||
              !is_within(c, slow);
     });

@@ -118,14 +118,18 @@ std::vector<Driver> remembered_drivers(const VisitLog& log) {
   for (std::size_t i = 0; i < kAxisCount; ++i) a_g[i] = specific_force_component_g(log, i);
   const std::vector<Column> columns = recorded_columns(log);
   for (const double tau_s : kMemory_s) {
-    const std::string past =
-        "average of the past, time constant " + std::to_string(static_cast<int>(tau_s)) + " s";
+    const std::string constant = "time constant " + std::to_string(static_cast<int>(tau_s)) + " s";
+    const std::string past = "average of the past, " + constant;
     Driver& attitude = drivers.emplace_back(Driver{"previous_pose", past, {}});
     for (std::size_t i = 0; i < kAxisCount; ++i)
       attitude.value[i] = remembered(log, a_g[i], tau_s, true);
     for (const Column& column : columns) {
       const std::vector<double> value = remembered(log, column.value, tau_s, false);
       drivers.push_back({column.name, past, {value, value, value}, false, true});
+      // Slopes between neighbours drown in the noise of what was recorded.
+      std::vector<double> rise = column.value;
+      for (std::size_t k = 0; k < rise.size(); ++k) rise[k] -= value[k];
+      drivers.push_back({column.name + ".rate", past, {rise, rise, rise}, false, true});
     }
   }
   return drivers;

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "estimator/calibrate.h"
 #include "estimator/kinematics.h"
@@ -41,18 +42,22 @@ TEST(DetectionLimits, OfAQuadraticIsWhatPlainLeastSquaresSays) {
   // 60 means of 20 samples with 0.3 mV: the uncertainty of a fifth column beside the four.
   const auto n = std::ssize(data.run.poses);
   Eigen::MatrixXd A(n, 4);
-  Eigen::VectorXd square(n);
+  Eigen::VectorXd square(n), mean_V(n);
   for (Eigen::Index k = 0; k < n; ++k) {
     const Pose& pose = data.run.poses[static_cast<std::size_t>(k)];
     const Eigen::Vector3d a =
         specific_force(pose.delta_deg, pose.h_deg, 9.8101 / kStandardGravity_mps2).a_g;
     A.row(k) << a.transpose(), 1;
     square(k) = a.x() * a.x();
+    const auto first = data.run.samples.u_V[0].begin() + static_cast<std::ptrdiff_t>(pose.first);
+    mean_V(k) = std::accumulate(first, first + 20, 0.0) / 20;
   }
   const Eigen::VectorXd left = square - A * A.colPivHouseholderQr().solve(square);
   const double expected = 5 * 3e-4 / std::sqrt(20.0) / 0.032 / left.norm();
   EXPECT_NEAR(limit->limit, expected, 0.15 * expected);  // the noise itself is estimated
   EXPECT_EQ(limit->best, limit->limit);
+  const double sigmas = std::abs(left.dot(mean_V)) / left.norm() / (3e-4 / std::sqrt(20.0));
+  EXPECT_NEAR(limit->sigmas, sigmas, 0.15 * sigmas + 0.05);
 }
 
 TEST(Findings, SingleReadingsOfAnUndeclaredConverterProveNoStep) {
@@ -148,6 +153,7 @@ TEST(Findings, TheFilterHasTheEffectInItsState) {
   ASSERT_EQ(found.parameters.size(), 1u);
   const EffectParameter& k2 = found.parameters.front();
   ASSERT_TRUE(k2.filter.has_value());
+  EXPECT_NEAR(found.sigmas, k2.value / k2.u, 0.05 * found.sigmas);
   EXPECT_NEAR(k2.filter->value, 0.02, 4 * k2.filter->u);
   EXPECT_NEAR(k2.filter->u, k2.u, 0.2 * k2.u);
   EXPECT_NE(k2.filter->value, k2.value);  // two ways to compute

@@ -27,6 +27,19 @@ TEST(DiagnosisStudy, NamesAnEffectAndSaysNothingOnACleanSet) {
   EXPECT_LT(without.after.heldout, 1.15 * without.oracle.heldout);
 }
 
+// The bias follows the temperature less its average of the past: seen over the whole run, that
+// looks like slow noise.
+TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
+  const SetOutcome outcome = run_set({.seed = 17,
+                                      .effects = {"own.thermal_gradient"},
+                                      .order = sim::RecordOrder::raster,
+                                      .static_s = 1800});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.listed_instead, 0) << outcome.found;
+  EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
+}
+
 // The covariance that the oracle uses is the one that the simulated noise has.
 TEST(DiagnosisStudy, TrueCovariancePredictsTheResidualOfPlainSets) {
   for (const NoiseKind kind : {NoiseKind::white, NoiseKind::examples, NoiseKind::coloured}) {
