@@ -204,6 +204,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   const double span_s = experiment.poses.back().t_mean_s - experiment.poses.front().t_arrival_s;
   work.noise = in_filter_terms(work.record, experiment.processes, work.pooled, span_s);
   work.V = NoisePool(experiment.processes, work.record, work.own_V2).covariance(work.pooled.power);
+  if (work.pooled.covariance.size() == 0) work.pooled.covariance = work.V;
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
     work.noise_known = known;
@@ -214,6 +215,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   const double dof = static_cast<double>(std::max<Eigen::Index>(n - 4, 1));
   const double variance_V2 = std::max(ordinary.residual_sum_of_squares / dof, 1e-24);
   work.V = Eigen::MatrixXd::Identity(n, n) * variance_V2;
+  work.pooled.covariance = work.V;
+  work.pooled.power(kTermN) = variance_V2 / experiment.processes.unit[kTermN](0, 0);
   work.fit = *fit_generalised(experiment.A, work.y, work.V);
   use_codes(experiment, axis, work);
   return work;

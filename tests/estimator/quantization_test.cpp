@@ -153,6 +153,7 @@ TEST(Calibrate, UsesTheCodesWhereStepsAreCoarseAndSaysSo) {
     ASSERT_TRUE(with.quantization[axis]);
     EXPECT_NEAR(with.quantization[axis]->sigma_V, 1.2e-4, 0.15e-4);
     EXPECT_FALSE(without.quantization[axis]);
+    EXPECT_TRUE(without.final.batch_ls[axis].value.allFinite());
     EXPECT_LT(with.estimates.agreement_en[axis], 1);
     // The stated uncertainty holds.
     const AxisEstimate& batch = with.estimates.batch_ls[axis];
