@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/search.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
