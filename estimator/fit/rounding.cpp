@@ -53,6 +53,22 @@ double rounded_variance(double value, double sigma, double slow) {
          (rounded_variance(value - away, sigma) + rounded_variance(value + away, sigma)) / 6;
 }
 
+/// Noise before rounding, in steps, of readings of these values (in steps from a code) that scatter
+/// by `recorded` on average: poses that prefer a part of the step scatter more or less than all
+/// parts together do. `uniform`: what it would be if they did not.
+double sigma_at(const Eigen::ArrayXd& values, double recorded_variance, double uniform,
+                double slow) {
+  constexpr int kHalvings = 12;
+  double low = 0.5 * uniform, high = 2 * uniform;
+  for (int k = 0; k < kHalvings; ++k) {
+    const double sigma = 0.5 * (low + high);
+    double variance = 0;
+    for (const double value : values) variance += rounded_variance(value, sigma, slow);
+    (variance < recorded_variance * static_cast<double>(values.size()) ? low : high) = sigma;
+  }
+  return 0.5 * (low + high);
+}
+
 }  // namespace
 
 double sd_before_rounding_V(double step_V, double recorded_V) {
@@ -76,8 +92,8 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
                               const Adc& adc, double sample_sd_V, double samples_per_mean) {
   const double step_V = adc.lsb_V();
   const double recorded_V2 = sample_sd_V * sample_sd_V;
-  const double white_V2 = noise_before_rounding_V2(step_V, recorded_V2);
-  const double sigma_V = std::sqrt(white_V2);
+  double white_V2 = noise_before_rounding_V2(step_V, recorded_V2);
+  double sigma_V = std::sqrt(white_V2);
   const Eigen::Index n = mean_V.size();
   if (!is_coarse_against(step_V, sample_sd_V)) return {mean_V, Eigen::VectorXd::Zero(n), false};
 
@@ -92,6 +108,10 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
   const double origin_V = 0.5 * (adc.min_V + adc.max_V);
   // How far the true mean is from the expected one blurs the bias; found by repetition.
   double slow_V2 = std::max(0.0, before_V2 - full_V2 - mean_white_V2);
+  sigma_V =
+      step_V * sigma_at((expected_V.array() - origin_V) / step_V, recorded_V2 / (step_V * step_V),
+                        sigma_V / step_V, std::sqrt(slow_V2) / step_V);
+  white_V2 = sigma_V * sigma_V;
   for (int round = 0; round < 4; ++round) {
     // On the flats of the staircase undoing it to first order would blow up what is not of first
     // order.
