@@ -177,9 +177,14 @@ class HarmonicSeries final : public FunctionOfDriver {
 /// One wave of unknown period over the range that was seen.
 class Wave final : public FunctionOfDriver {
  public:
-  /// Periods in the range: least, least + step … most.
-  Wave(DriverPointer driver, Target target, double least, double step, double most)
-      : FunctionOfDriver(std::move(driver), target), least_(least), step_(step), most_(most) {}
+  /// Periods in the range: least, least + step … most; none shorter than `shortest`.
+  Wave(DriverPointer driver, Target target, double least, double step, double most,
+       double shortest = 0)
+      : FunctionOfDriver(std::move(driver), target),
+        least_(least),
+        step_(step),
+        most_(most),
+        shortest_(shortest) {}
 
   bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
@@ -193,7 +198,8 @@ class Wave final : public FunctionOfDriver {
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
     for (double periods = least_; periods <= most_; periods += step_)
-      starts.push_back({{low, (high - low) / periods, size, size}});
+      if ((high - low) / periods >= shortest_)
+        starts.push_back({{low, (high - low) / periods, size, size}});
     return starts;
   }
 
@@ -204,7 +210,7 @@ class Wave final : public FunctionOfDriver {
     return p[2] * std::cos(phase) + p[3] * std::sin(phase);
   }
 
-  double least_, step_, most_;
+  double least_, step_, most_, shortest_;
 };
 
 /// Something that happened once and took a while: a bell of unknown middle and width.
@@ -376,10 +382,13 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
     add_polynomials(driver, {TermForm::bias}, {1, 2});
     add_polynomials(driver, {TermForm::scale}, {1, 2});
   }
+  // What repeats from step to step, or every second step, is the rounding itself, or a bit.
+  constexpr double kShortestWave = 2.5;  // steps
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const auto driver = std::make_shared<const Driver>(code_driver(log, axis));
     if (any || driver->varies())
-      terms.push_back(std::make_unique<Wave>(driver, Target{TermForm::bias}, 3, 0.5, 40));
+      terms.push_back(std::make_unique<Wave>(driver, Target{TermForm::bias}, 3, 0.5, 40,
+                                             log.adc ? kShortestWave * log.adc->lsb_V() : 0));
   }
   for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
     for (const int degree : {1, 2, 3})
