@@ -45,7 +45,7 @@ dl { display: grid; grid-template-columns: 200px minmax(0, 1fr); gap: 3px 14px; 
 dt { color: #444; overflow-wrap: anywhere; }
 dd { margin: 0; overflow-wrap: anywhere; }
 .missing { color: #a33; font-style: italic; }
-p:has(+ figure), p:has(+ table) { break-after: avoid; }
+p:has(+ figure), p:has(+ table), p:has(+ dl) { break-after: avoid; }
 figure { margin: 16px 0 20px; break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; display: block; }
 figcaption { font-size: 12.5px; color: #444; margin-top: 4px; }

@@ -73,8 +73,28 @@ std::vector<double> values(const xmlNode* node) {
   return list;
 }
 
+/// Of the dcc:quantity that a value stands in.
+std::string ref_type_above(const xmlNode* node) {
+  while (node != nullptr && !is(node, kDcc, "quantity")) node = node->parent;
+  return node == nullptr ? std::string{} : attribute(node, "refType");
+}
+
+double first_value(const xmlNode* node) {
+  const std::vector<double> list = values(node);
+  return list.empty() ? std::numeric_limits<double>::quiet_NaN() : list.front();
+}
+
+XmlReal read_real(const xmlNode* node) {
+  XmlReal real{ref_type_above(node), first_value(child(node, kSi, "value")), 0};
+  walk(node->children, [&](const xmlNode* n) {
+    if (is(n, kSi, "valueExpandedMU")) real.expanded = first_value(n);
+  });
+  return real;
+}
+
 XmlList read_list(const xmlNode* node) {
   XmlList list;
+  list.ref_type = ref_type_above(node);
   list.labels = words(child(node, kSi, "labelXMLList"));
   list.values = values(child(node, kSi, "valueXMLList"));
   if (const xmlNode* unit = child(node, kSi, "unitXMLList")) list.unit = text_of(unit);
@@ -111,6 +131,12 @@ const XmlList* ReadDcc::list(std::string_view first_label, std::string_view unit
   return it == lists.end() ? nullptr : &*it;
 }
 
+const XmlList* ReadDcc::list_of(std::string_view ref_type) const {
+  const auto it = std::find_if(lists.begin(), lists.end(),
+                               [&](const XmlList& l) { return l.ref_type == ref_type; });
+  return it == lists.end() ? nullptr : &*it;
+}
+
 Result<ReadDcc> read_dcc(std::string_view xml, const std::string& name) {
   ReadDcc dcc;
   const std::unique_ptr<xmlParserCtxt, void (*)(xmlParserCtxt*)> parser(xmlNewParserCtxt(),
@@ -132,6 +158,8 @@ Result<ReadDcc> read_dcc(std::string_view xml, const std::string& name) {
   walk(dcc, [&](const xmlNode* node) {
     if (is(node, kDcc, "uniqueIdentifier")) dcc.id = text_of(node);
     if (is(node, kSi, "realListXMLList")) dcc.lists.push_back(read_list(node));
+    if (is(node, kSi, "real")) dcc.reals.push_back(read_real(node));
+    if (is(node, kDcc, "conformity")) dcc.conformity = text_of(node);
     if (!is(node, kDcc, "identification")) return;
     const xmlNode* value = child(node, kDcc, "value");
     const std::string text = value == nullptr ? "" : text_of(value);

@@ -14,10 +14,18 @@
 namespace plumbline::app {
 
 struct XmlList {
+  std::string ref_type;  ///< of the dcc:quantity that holds it
   std::vector<std::string> labels;
   std::vector<double> values;
   std::vector<double> expanded;  ///< expanded uncertainties; empty when there are none
   std::string unit;
+};
+
+/// One si:real of the results.
+struct XmlReal {
+  std::string ref_type;  ///< of the dcc:quantity that holds it
+  double value = 0;
+  double expanded = 0;  ///< expanded uncertainty; 0 when none is stated
 };
 
 struct ReadDcc {
@@ -26,11 +34,15 @@ struct ReadDcc {
   /// refType of the identification → digits of its "sha256:" value, in document order.
   std::vector<std::pair<std::string, std::string>> hashes;
   std::vector<XmlList> lists;  ///< every si:realListXMLList, in document order
+  std::vector<XmlReal> reals;  ///< every si:real of a dcc:quantity, likewise
+  std::string conformity;      ///< what dcc:conformity says; empty when it states none
 
   /// Empty when there is none.
   std::string hash(std::string_view ref_type) const;
   /// The list whose first label and unit are these; null when there is none.
   const XmlList* list(std::string_view first_label, std::string_view unit) const;
+  /// The first list of the quantities of this refType; null when there is none.
+  const XmlList* list_of(std::string_view ref_type) const;
 };
 
 /// Well-formed XML with the root of a DCC; nothing is fetched from anywhere, no entity is expanded.

@@ -4,6 +4,7 @@
 #include <libxml/parser.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "app/certificate/dcc/dcc_units.h"
@@ -189,6 +190,57 @@ void check_nine(const Json& scalar, const ReadDcc& dcc, const std::vector<std::s
   compare_parameters(angles, dcc.list("angle_yz", "\\radian"), "nonorthogonality", words, report);
 }
 
+/// Parameters of the added effects, in the order in which both state them.
+void check_effects(const Json& diagnosis, const ReadDcc& dcc, VerifyReport& report) {
+  std::vector<std::pair<double, double>> stated, found;
+  for (const char* kind : {"effects", "unlisted"}) {
+    for (const Json& effect : diagnosis.at(kind)) {
+      for (const Json& p : effect.at("parameters")) {
+        // Units that the D-SI does not know are stated in words.
+        const auto unit = dsi_unit(p.at("unit").get<std::string>());
+        if (!unit) continue;
+        stated.emplace_back(unit->factor * p.at("value").get<double>(),
+                            2 * (unit->factor * p.at("u").get<double>()));
+      }
+    }
+  }
+  for (const XmlReal& real : dcc.reals) {
+    if (real.ref_type == dcc_ref::kEffect) found.emplace_back(real.value, real.expanded);
+  }
+  report.expect(stated == found, "XML and result.json agree in the added effects",
+                "the numbers differ");
+}
+
+void check_errors(const Json& error, const ReadDcc& dcc, VerifyReport& report) {
+  const auto compare = [&](const std::string& ref_type, const Json& stated) {
+    const XmlList* list = dcc.list_of("plumbline_" + ref_type);
+    report.expect(list != nullptr && list->values == stated.get<std::vector<double>>(),
+                  "XML and result.json agree in " + ref_type, "the numbers differ");
+  };
+  for (const auto& [phase, suffix] : {std::pair("before", "Before"), std::pair("after", "After")}) {
+    compare(fmt::format("heldoutRms{}", suffix), error.at(phase).at("heldout_pose_rms"));
+    compare(fmt::format("heldoutMax{}", suffix), error.at(phase).at("heldout_pose_max_abs"));
+  }
+}
+
+/// "conditional_pass" → "conditionalPass", as the schema has it.
+std::string camel_case(const std::string& text) {
+  std::string camel;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    if (text[k] == '_') continue;
+    const bool first = k > 0 && text[k - 1] == '_';
+    camel += first ? static_cast<char>(std::toupper(static_cast<unsigned char>(text[k]))) : text[k];
+  }
+  return camel;
+}
+
+void check_decision(const Json& decision, const ReadDcc& dcc, VerifyReport& report) {
+  const std::string status = decision.at("status").get<std::string>();
+  const std::string stated = status == "none" ? "" : camel_case(status);
+  report.expect(dcc.conformity == stated, "XML and result.json agree in the decision",
+                fmt::format("“{}” and “{}”", dcc.conformity, stated));
+}
+
 void check_numbers(const Files& files, const ReadDcc& dcc, VerifyReport& report) {
   std::optional<std::vector<std::string>> words;
   if (const auto parsed = html_words(*files.html, "certificate.html")) words = *parsed;
@@ -200,6 +252,9 @@ void check_numbers(const Files& files, const ReadDcc& dcc, VerifyReport& report)
     } else {
       check_twelve(json.at("final").at("batch_ls"), dcc, printed, report);
     }
+    check_effects(json.at("diagnosis"), dcc, report);
+    check_errors(json.at("error"), dcc, report);
+    check_decision(json.at("decision"), dcc, report);
   } catch (const std::exception& error) {
     report.bad(fmt::format("result.json: not usable: {}", error.what()));
   }

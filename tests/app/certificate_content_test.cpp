@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
+#include <regex>
 
 #include "app/certificate/budget.h"
 #include "app/certificate/dcc/dcc_writer.h"
@@ -280,6 +281,33 @@ TEST(Certificate, UkrainianForWhatTheCoreSays) {
                       "rig.backlash by 7.1 standard deviations"),
             "подальші положення у випадковому порядку (кількість 3, h від 10° до 40°) відрізнять "
             "його від rig.backlash на 7.1 стандартних відхилень");
+}
+
+TEST(Certificate, UkrainianForACalibrationWithoutAngles) {
+  const Translator uk(Language::uk);
+  const std::regex english("\\b[a-z]{3,} [a-z]{2,}\\b");
+  for (const char* text :
+       {"residual |a| − g 10.4 mm/s² where 3.75 is expected from the noise inside the rests (5.51 "
+        "when its correlation is counted): too much; in part explained by sensor.quadratic (y) k2 "
+        "= -0.00415 ± 0.0005 g/g^2; 7.88 mm/s² after, still more than the noise; among 1584 "
+        "further hypotheses (temperature and columns where recorded, time, order, polynomials of "
+        "the attitude) none explains the rest",
+        "residual |a| − g 9 mm/s² where 3 is expected from the noise inside the rests: too much; "
+        "tried and excluded: 1584 hypotheses (nonlinearity, hysteresis, settling, drift and steps "
+        "in time, temperature and other columns where recorded); the best of them, sensor.drift "
+        "(x), has p = 0.02",
+        "17 rests are too few to tell an effect from noise; at least 20 are needed",
+        "unlisted structure driven by temp_C (z)",
+        "readings at known angles (calibrate with the dividing head): without angles only the sum "
+        "of the three axes' terms along gravity is seen",
+        "the commanded angles and the angle-free result disagree (largest E_n 1.3); directions of "
+        "gravity differ by 0.85° rms where noise and positioning leave 0.1°: the head or the "
+        "mounting has an error of that size",
+        "the commanded angles and the angle-free result agree (largest E_n 0.3); directions of "
+        "gravity differ by 0.05° rms where noise and positioning leave 0.1°: no error of the head "
+        "is seen"}) {
+    EXPECT_FALSE(std::regex_search(uk.phrase(text), english)) << uk.phrase(text);
+  }
 }
 
 // What the sequencer and the rig write into a run; the operators' own words stay as they are.

@@ -4,12 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <openssl/evp.h>
-#include <openssl/pem.h>
-#include <openssl/rsa.h>
-#include <openssl/x509.h>
-#include <openssl/x509v3.h>
-
 #include <cstdlib>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -24,6 +18,7 @@
 #include "tests/app/dcc_numbers.h"
 #include "tests/app/example_set.h"
 #include "tests/app/program.h"
+#include "tests/app/signing_identity.h"
 #include "tests/app/temp_folder.h"
 
 namespace plumbline::app {
@@ -183,64 +178,6 @@ TEST(Fingerprint, HtmlHasTheWordsOfTheDocument) {
 }
 
 // --- the signature ---
-
-/// A key and a certificate for it by `issuer` (itself when there is none), as PEM files.
-class Identity {
- public:
-  explicit Identity(const std::string& name, const Identity* issuer = nullptr,
-                    EVP_PKEY* key = EVP_EC_gen("P-256"))
-      : key_(key), certificate_(X509_new()) {
-    X509_set_version(certificate_, 2);
-    ASN1_INTEGER_set(X509_get_serialNumber(certificate_), 7);
-    X509_gmtime_adj(X509_getm_notBefore(certificate_), -60);
-    X509_gmtime_adj(X509_getm_notAfter(certificate_), 86400);
-    X509_set_pubkey(certificate_, key_);
-    X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate_), "CN", MBSTRING_UTF8,
-                               reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);
-    X509_EXTENSION* authority =
-        X509V3_EXT_conf_nid(nullptr, nullptr, NID_basic_constraints, "critical,CA:TRUE");
-    X509_add_ext(certificate_, authority, -1);
-    X509_EXTENSION_free(authority);
-    const Identity& by = issuer == nullptr ? *this : *issuer;
-    X509_set_issuer_name(certificate_, X509_get_subject_name(by.certificate_));
-    X509_sign(certificate_, by.key_, EVP_sha256());
-  }
-  ~Identity() {
-    X509_free(certificate_);
-    EVP_PKEY_free(key_);
-  }
-  Identity(const Identity&) = delete;
-  Identity& operator=(const Identity&) = delete;
-
-  void expire() {
-    X509_gmtime_adj(X509_getm_notAfter(certificate_), -30);
-    X509_sign(certificate_, key_, EVP_sha256());
-  }
-  std::string certificate_pem() const {
-    return pem([&](BIO* bio) { PEM_write_bio_X509(bio, certificate_); });
-  }
-  std::string key_pem(const char* passphrase = nullptr) const {
-    return pem([&](BIO* bio) {
-      PEM_write_bio_PKCS8PrivateKey(bio, key_, passphrase == nullptr ? nullptr : EVP_aes_128_cbc(),
-                                    nullptr, 0, nullptr, const_cast<char*>(passphrase));
-    });
-  }
-
- private:
-  template <class Write>
-  static std::string pem(const Write& write) {
-    BIO* bio = BIO_new(BIO_s_mem());
-    write(bio);
-    const char* data = nullptr;
-    const auto size = BIO_get_mem_data(bio, &data);
-    std::string text(data, static_cast<std::size_t>(size));
-    BIO_free(bio);
-    return text;
-  }
-
-  EVP_PKEY* key_;
-  X509* certificate_;
-};
 
 class Signature : public testing::Test {
  protected:
@@ -479,19 +416,33 @@ TEST_F(Verify, EveryChangeIsNoticed) {
 }
 
 TEST_F(Verify, ForgedHashesDoNotMakeNumbersAgree) {
-  // Somebody who changes a value in the XML and puts the XML's own hash right.
+  // Somebody who changes what the XML says and puts the XML's own hash right.
+  ExampleSet set;
+  set.quadratic_g_per_g2 = 0.05;
+  set.write(folder_.path());
+  write_text(folder_ / "run.toml", example_run_toml() + "[limits]\nmax_abs_error_mps2 = 0.5\n");
+  calibrate("out", {});
+  const std::string whole = read("certificate.xml");
   const auto json = nlohmann::json::parse(read("result.json"));
-  std::string xml = read("certificate.xml");
-  const std::string from = json["final"]["batch_ls"]["x"]["U0_V"].dump();
-  xml = replaced(xml, from, "-2.5");
-  const auto dcc = read_dcc(xml, "forged.xml");
-  ASSERT_TRUE(dcc);
-  xml = replaced(xml, dcc->hash(dcc_ref::kSelf), dcc_self_hash(xml));
-  write_text(folder_ / "out/certificate.xml", xml);
-  const auto outcome = verify(folder_ / "out");
-  EXPECT_EQ(outcome.exit_code, 1);
-  EXPECT_THAT(outcome.out, HasSubstr("ok     certificate.xml: the hash is that"));
-  EXPECT_THAT(outcome.out, HasSubstr("FAILED XML and result.json agree in U_x0, U_y0, U_z0"));
+  const auto is_noticed = [&](const std::string& from, const std::string& to,
+                              const std::string& in_what) {
+    std::string xml = replaced(whole, from, to);
+    const auto dcc = read_dcc(xml, "forged.xml");
+    ASSERT_TRUE(dcc);
+    xml = replaced(xml, dcc->hash(dcc_ref::kSelf), dcc_self_hash(xml));
+    write_text(folder_ / "out/certificate.xml", xml);
+    const auto outcome = verify(folder_ / "out");
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_THAT(outcome.out, HasSubstr("ok     certificate.xml: the hash is that"));
+    EXPECT_THAT(outcome.out, HasSubstr("FAILED XML and result.json agree in " + in_what));
+  };
+  is_noticed(json["final"]["batch_ls"]["x"]["U0_V"].dump(), "-2.5", "U_x0, U_y0, U_z0");
+  is_noticed(json["error"]["after"]["heldout_pose_rms"][1].dump(), "0.001", "heldoutRmsAfter");
+  is_noticed(">pass<", ">fail<", "the decision");
+  const std::string k2 = "<si:label>k2</si:label>";
+  const std::size_t at = whole.find("<si:value>", whole.find(k2));
+  is_noticed(whole.substr(at, whole.find('/', at) - at - 1), "<si:value>0.001",
+             "the added effects");
 }
 
 TEST_F(Verify, WhatCannotBeReadIsOneLineAndCode2) {
