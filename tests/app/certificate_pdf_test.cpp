@@ -360,14 +360,19 @@ Picture read_png(const fs::path& path) {
 TEST_F(CertificatePdf, PagesLookAsApproved) {
   CertificateExample example;
   example.add_effects(2);
-  const auto pdf = write("approved.pdf", pdf_of(make_certificate(example.input())));
+  ScalarExample scalar;
+  scalar.add_findings();
   const fs::path seen = fs::path(PLUMBLINE_BINARY_DIR) / "certificate-pages";
   fs::remove_all(seen);
   fs::create_directories(seen);
-  // Gray and coarse: what is compared is where things are and how dark.
-  std::system(
-      fmt::format("pdftoppm -r 30 -gray -png '{}' '{}'", pdf.string(), (seen / "page").string())
-          .c_str());
+  for (const auto& [name, document] : {std::pair("page", make_certificate(example.input())),
+                                       std::pair("scalar", scalar.document())}) {
+    const auto pdf = write(fmt::format("approved-{}.pdf", name), pdf_of(document));
+    // Gray and coarse: what is compared is where things are and how dark.
+    std::system(
+        fmt::format("pdftoppm -r 30 -gray -png '{}' '{}'", pdf.string(), (seen / name).string())
+            .c_str());
+  }
   const fs::path approved = fs::path(PLUMBLINE_SOURCE_DIR) / "tests/golden/certificate-pages";
   if (std::getenv("PLUMBLINE_APPROVE") != nullptr) {
     fs::remove_all(approved);
