@@ -60,7 +60,7 @@ void expect_good(const TempFolder& folder, const ProgramOutcome& outcome, double
   EXPECT_FALSE(json.contains("estimates"));
   const auto& scalar = json.at("scalar");
   EXPECT_EQ(scalar.at("intervals"), intervals);
-  for (int i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_NEAR(scalar.at("bias").at(i).get<double>(), 32000, 1);
     EXPECT_NEAR(scalar.at("scale").at(i).get<double>(), 0.0024, 1e-6);
   }

@@ -203,8 +203,9 @@ Case drive_case(int index, std::mt19937_64& random) {
   const char* axis = std::uniform_int_distribution<int>(0, 1)(random) == 0 ? "delta" : "h";
   static constexpr std::array kKinds = {"drive.stall",       "drive.alarm", "drive.limit",
                                         "drive.lost_homing", "drive.alarm", "drive.slip"};
-  const std::string kind = kKinds[static_cast<std::size_t>(index) % kKinds.size()];
-  const std::string code = index % kKinds.size() == 4 ? "code = 0x84\n" : "";  // the watchdog's
+  const std::size_t which = static_cast<std::size_t>(index) % kKinds.size();
+  const std::string kind = kKinds[which];
+  const std::string code = which == 4 ? "code = 0x84\n" : "";  // the watchdog's
   Case one;
   one.name = fmt::format("{} {} move {} delay {:.2f}", kind, axis, move, delay_s);
   one.world = fault(kind, fmt::format("{}axis = \"{}\"\nmove = {}\ndelay_s = {:.3f}{}", code, axis,

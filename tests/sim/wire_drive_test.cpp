@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rig/sim/drive.h"
+#include "tests/sim/wire_rig.h"
 
 namespace plumbline::sim {
 namespace {

@@ -12,6 +12,7 @@
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/fit/least_squares.h"
 #include "estimator/pose_means.h"
+#include "rig/sim/effects/effect.h"
 #include "tests/study/diagnosis.h"
 
 namespace plumbline::study {
