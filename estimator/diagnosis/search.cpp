@@ -56,8 +56,15 @@ class Search {
   SearchResult run() {
     for (std::size_t c = 0; c < list_.candidates.size(); ++c)
       if (list_.candidates[c].effect->certain(input_.log)) adopt_proven(c);
-    while (chosen_.size() < options_.max_effects && (add_one() || add_slow_one()))
+    // Where the best of the slow ones is superfluous as soon as it is there, so are the others.
+    bool worth_slow_look = true;
+    while (chosen_.size() < options_.max_effects) {
+      const std::size_t before = chosen_.size();
+      const bool found = add_one();
+      if (!found && !(worth_slow_look && add_slow_one())) break;
       drop_superfluous();
+      if (!found) worth_slow_look = chosen_.size() > before;
+    }
     while (exchange_one()) drop_superfluous();
     return result();
   }
