@@ -197,9 +197,11 @@ class Wave final : public FunctionOfDriver {
     const auto [low, high] = range();
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    for (double periods = least_; periods <= most_; periods += step_)
-      if ((high - low) / periods >= shortest_)
-        starts.push_back({{low, (high - low) / periods, size, size}});
+    const auto steps = std::lround((most_ - least_) / step_);
+    for (long k = 0; k <= steps; ++k) {
+      const double period = (high - low) / (least_ + static_cast<double>(k) * step_);
+      if (period >= shortest_) starts.push_back({{low, period, size, size}});
+    }
     return starts;
   }
 
@@ -228,8 +230,10 @@ class Bell final : public FunctionOfDriver {
     std::vector<Hypothesis> starts;
     for (const double share : {1.0 / 60, 1.0 / 30, 1.0 / 15}) {
       const double width = share * (high - low);
-      for (double middle = low; middle <= high; middle += 1.5 * width)
-        starts.push_back({{middle, width, target().typical_size()}});
+      const auto steps = static_cast<long>((high - low) / (1.5 * width));
+      for (long k = 0; k <= steps; ++k)
+        starts.push_back(
+            {{low + 1.5 * width * static_cast<double>(k), width, target().typical_size()}});
     }
     return starts;
   }
@@ -268,8 +272,8 @@ class DwellCourse final : public SmoothTerm {
   const std::string& driver() const override { return driver_; }
   TermForm form() const override { return TermForm::sample; }
   std::string shape() const override {
-    const std::string words = "polynomial of degree " + std::to_string(degree_) +
-                              " in the logarithm of the time since arrival";
+    std::string words = "polynomial of degree " + std::to_string(degree_) +
+                        " in the logarithm of the time since arrival";
     switch (of_) {
       case CourseOf::one:
         break;

@@ -33,9 +33,9 @@ double noise_before_rounding_V2(double step_V, double recorded_V2) {
 /// Variance of one rounded reading of `value` (in steps from a code) with noise `sigma`, steps².
 double rounded_variance(double value, double sigma) {
   const auto centre = std::round(value);
-  const auto reach = std::ceil(5 * sigma + 1);
+  const int reach = static_cast<int>(std::ceil(5 * sigma + 1));
   double mean = 0, square = 0;
-  for (double code = -reach; code <= reach; ++code) {
+  for (int code = -reach; code <= reach; ++code) {
     const double edge = centre + code - value;
     const double share =
         sigma > 0 ? normal_below((edge + 0.5) / sigma) - normal_below((edge - 0.5) / sigma)

@@ -387,9 +387,12 @@ double flicker_allan_variance(const RecordTerms& terms, double tau_s) {
   const double low = std::log(terms.flicker_low_hz > 0 ? terms.flicker_low_hz : 1e-5 / tau_s);
   const double high =
       std::log(std::isfinite(terms.flicker_high_hz) ? terms.flicker_high_hz : 1e5 / tau_s);
+  const auto processes = std::lround((high - low) / step);
   double variance = 0;
-  for (double log_hz = low + 0.5 * step; log_hz < high; log_hz += step)
-    variance += step / pi * markov_allan_variance(tau_s, 1 / (2 * pi * std::exp(log_hz)));
+  for (long k = 0; k < processes; ++k) {
+    const double hz = std::exp(low + (static_cast<double>(k) + 0.5) * step);
+    variance += step / pi * markov_allan_variance(tau_s, 1 / (2 * pi * hz));
+  }
   return variance;
 }
 

@@ -46,12 +46,15 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
   const double span_s =
       windows.back().first_s + duration_s(windows.back()) - windows.front().first_s;
   std::vector<double> dwell_s;
+  dwell_s.reserve(windows.size());
   for (const SampleWindow& window : windows) dwell_s.push_back(duration_s(window));
   std::nth_element(dwell_s.begin(), dwell_s.begin() + std::ssize(dwell_s) / 2, dwell_s.end());
   const double shortest_s = 0.5 * dwell_s[dwell_s.size() / 2];
-  for (double tau_s = 0.7 * span_s; tau_s > shortest_s; tau_s /= kMarkovRatio) {
+  double tau_s = 0.7 * span_s;
+  while (tau_s > shortest_s) {
     processes.decay_per_s.push_back(1 / tau_s);
     processes.unit.push_back(about_mean_of_run(bounded_walk(windows, 1 / tau_s)));
+    tau_s /= kMarkovRatio;
   }
   for (const Eigen::MatrixXd& unit : processes.unit)
     processes.is_diagonal.push_back(unit.isDiagonal(0));
