@@ -18,7 +18,7 @@ struct SearchOptions {
   double false_alarm = 1e-4;
   /// The same for a slow effect that is compared with the noise estimated anew under each
   /// hypothesis.
-  double false_alarm_of_slow = 1e-3;
+  double false_alarm_of_slow = 3e-4;
   int replicates = 150;  ///< of simulated noise, for the look-elsewhere correction
   std::size_t max_effects = 6;
 };
