@@ -167,9 +167,10 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
       }
     }
     if (owner.empty()) break;
-    const std::vector<double> closer_sigmas = beside.sigmas(closer);
+    const std::vector<Eigen::MatrixXd> transforms = beside.transforms_of(closer);
     for (std::size_t c = 0; c < owner.size(); ++c)
-      owner[c]->course.emplace_back(closer.candidates[c].hypothesis.p.front(), closer_sigmas[c]);
+      owner[c]->course.emplace_back(closer.candidates[c].hypothesis.p.front(),
+                                    size_sigmas(transforms[c]));
   }
   for (Size& size : sizes) {
     size.sort();
@@ -203,10 +204,11 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
          const CandidateResponses responses =
              candidate_responses(input.log, closer, result.whitening, result.fit.parameters);
          const CandidateGains closer_gains(responses, result.fit);
-         std::vector<double> sigmas;
+         std::vector<Eigen::MatrixXd> transforms;
+         transforms.reserve(closer.candidates.size());
          for (std::size_t c = 0; c < closer.candidates.size(); ++c)
-           sigmas.push_back(size_sigmas(closer_gains.transform(c)));
-         return sigmas;
+           transforms.push_back(closer_gains.transform(c));
+         return transforms;
        }});
 }
 

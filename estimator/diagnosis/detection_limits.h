@@ -17,8 +17,8 @@ struct BesideModel {
   std::function<Eigen::MatrixXd(std::size_t candidate)> transform;
   /// How likely its gain is by itself in noise alone.
   std::function<double(std::size_t candidate)> log_p;
-  /// By how many σ each of further hypotheses without amplitude stands out.
-  std::function<std::vector<double>(const CandidateList&)> sigmas;
+  /// The same transforms of further hypotheses.
+  std::function<std::vector<Eigen::MatrixXd>(const CandidateList&)> transforms_of;
 };
 
 /// For every named effect that is not in the model, axis by axis: the amplitude that is 5 standard

@@ -306,12 +306,11 @@ std::vector<DetectionLimit> scalar_detection_limits(const ScalarData& data,
        },
        [&](const CandidateList& closer) {
          const ScalarDirections beside(data, closer, fit, covariance);
-         std::vector<double> sigmas;
-         for (std::size_t c = 0; c < closer.candidates.size(); ++c) {
-           const Eigen::MatrixXd transform = beside.transform(closer.candidates[c], c);
-           sigmas.push_back(transform.rows() == 0 ? 0 : 1 / transform(0, 0));
-         }
-         return sigmas;
+         std::vector<Eigen::MatrixXd> transforms;
+         transforms.reserve(closer.candidates.size());
+         for (std::size_t c = 0; c < closer.candidates.size(); ++c)
+           transforms.push_back(beside.transform(closer.candidates[c], c));
+         return transforms;
        }});
 }
 
