@@ -63,6 +63,13 @@ TEST(StrictToml, AControlCharacterForAKeyIsRefusedNotAsserted) {
   EXPECT_TRUE(message_of("[\x1c]\n", [](StrictTable&) {}).starts_with("f.toml:1:2: "));
 }
 
+TEST(StrictToml, LettersOutsideAStringAreRefused) {
+  // Letters below U+049A, where the library's table of whitespace has a hole.
+  const auto nothing = [](StrictTable&) {};
+  EXPECT_TRUE(message_of("rate_hz = 2.е-5\n", nothing).starts_with("f.toml:1:"));
+  EXPECT_TRUE(message_of("частота = 50\n", nothing).starts_with("f.toml:1:"));
+}
+
 TEST(StrictToml, NearestSuggestsNothingFar) {
   EXPECT_EQ(nearest("order", {"ordr", "speed"}), "ordr");
   EXPECT_EQ(nearest("zzzzzz", {"order", "speed"}), "");
