@@ -150,11 +150,11 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   work.quantized = std::move(quantized);
 }
 
-bool rounded_coarser_than_declared(const CalibrationInput& input, std::size_t axis) {
+bool rounded_as_declared(const CalibrationInput& input, std::size_t axis) {
   const auto& adc = input.description.adc;
-  return adc && coarser_lattice(codes_seen(input.run.samples.u_V[axis], *adc), *adc,
-                                dwells_over_codes(input.run, axis, *adc))
-                    .has_value();
+  if (!adc) return true;
+  const CodeFaults faults = code_faults(input.run, axis, *adc);
+  return faults.stuck_bits.empty() && !faults.coarser_lattice;
 }
 
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
@@ -187,7 +187,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   }
   const NoisePowers identified_powers = noise_powers(work.record);
   bool known = identified_powers.sum() > 0 || free.coarse;
-  if (!known && rounded_coarser_than_declared(experiment.input, axis)) {
+  if (!known && !rounded_as_declared(experiment.input, axis)) {
     // Rounding hides the noise within the dwells; how the pose means scatter tells of both.
     work.record = without_record(identified);
     known = true;

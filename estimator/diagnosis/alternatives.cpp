@@ -50,6 +50,23 @@ EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
                             base.effects.size());
 }
 
+/// What the codes prove is only replaced by what they prove as well.
+std::vector<Alternative> proven_rivals(const SearchInput& input, const CandidateList& list,
+                                       const SearchResult& result, const EnlargedParameters& base,
+                                       const Candidate& found) {
+  std::vector<Alternative> rivals;
+  for (const Candidate& candidate : list.candidates) {
+    if (candidate.axis != found.axis || candidate.effect == found.effect ||
+        !candidate.effect->certain(input.log))
+      continue;
+    EnlargedParameters model = base;
+    model.effects.push_back(candidate.active());
+    EnlargedFit fit = fit_from_levels(input.log, result.observed, result.whitening, model);
+    if (fit.determined) rivals.push_back({candidate.effect->id(), std::move(fit)});
+  }
+  return rivals;
+}
+
 }  // namespace
 
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
@@ -57,6 +74,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   const Candidate& found = result.evidence[index].candidate;
   EnlargedParameters base = result.fit.parameters;
   base.effects.erase(base.effects.begin() + static_cast<std::ptrdiff_t>(index));
+  if (found.effect->certain(input.log)) return proven_rivals(input, list, result, base, found);
   const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
   const double found_gain = without.chi2 - result.fit.chi2;
   const auto found_free =

@@ -42,7 +42,7 @@ namespace {
 bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (term.driver() == std::string("code_") + kAxisName[i])
-      return log.coarser_lattice[i] || !log.stuck_bits[i].empty();
+      return log.codes[i].coarser_lattice || !log.codes[i].stuck_bits.empty();
   return false;
 }
 

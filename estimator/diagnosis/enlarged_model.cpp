@@ -415,4 +415,24 @@ EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed
   return fit_enlarged(log, observed, whitening, held);
 }
 
+EnlargedFit fit_from_levels(const VisitLog& log, const Observations& observed,
+                            const PoseWhitening& whitening, const EnlargedParameters& start) {
+  constexpr int kLevels = 16;
+  const std::size_t axis = start.effects.back().axis;
+  EnlargedParameters without = start;
+  without.effects.pop_back();
+  const Eigen::VectorXd change =
+      predict_means_V(log, start)[axis] - predict_means_V(log, without)[axis];
+  const double swing_V = change.maxCoeff() - change.minCoeff();
+  EnlargedFit best;
+  best.determined = false;
+  for (int level = -kLevels; level <= kLevels; ++level) {
+    EnlargedParameters shifted = start;
+    shifted.twelve[axis](3) += swing_V * level / kLevels;
+    EnlargedFit with = fit_enlarged(log, observed, whitening, shifted);
+    if (with.determined && (!best.determined || with.chi2 < best.chi2)) best = std::move(with);
+  }
+  return best;
+}
+
 }  // namespace plumbline

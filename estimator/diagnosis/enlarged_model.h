@@ -117,4 +117,10 @@ EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed
                                const PoseWhitening& whitening, const EnlargedParameters& start,
                                std::size_t first_new);
 
+/// The best of the same fits from several levels U_0 of the axis of the last effect, as far apart
+/// as the effect swings: what follows the codes hangs on the level more finely than the level is
+/// known without it. Not determined where none is.
+EnlargedFit fit_from_levels(const VisitLog& log, const Observations& observed,
+                            const PoseWhitening& whitening, const EnlargedParameters& start);
+
 }  // namespace plumbline

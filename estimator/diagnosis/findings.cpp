@@ -66,7 +66,7 @@ std::vector<Rivals> all_rivals(const SearchInput& input, const CandidateList& li
   std::vector<Rivals> rivals(search.evidence.size());
   parallel_for(rivals.size(), [&](std::size_t e) {
     const Effect& effect = *search.evidence[e].candidate.effect;
-    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr || effect.certain(input.log)) return;
+    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) return;
     rivals[e].alternatives = find_alternatives(input, list, search, e);
     rivals[e].separation = separate(input, search, e, rivals[e].alternatives, reach);
   });

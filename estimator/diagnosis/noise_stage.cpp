@@ -70,7 +70,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
       // A converter without one of its bits does not round as it should.
-      if (!input.log.adc || samples < 2 || !input.log.stuck_bits[i].empty()) return;
+      if (!input.log.adc || samples < 2 || !input.log.codes[i].stuck_bits.empty()) return;
       free = free_of_rounding(input.observed.mean_V[i], expected_V, *input.log.adc,
                               input.log.sample_sd_V[i], samples);
       mean_V = free.mean_V;
@@ -90,7 +90,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       if (beside.cols() > 0) columns.rightCols(beside.cols()) = beside;
       const Eigen::MatrixXd design = independent_columns(columns);
       const NoisePool pool(input.processes,
-                           free.coarse || input.log.coarser_lattice[i]
+                           free.coarse || input.log.codes[i].coarser_lattice
                                ? without_record(input.noise[i])
                                : input.noise[i],
                            input.positioning_V2[i] + free.variance_V2);

@@ -55,7 +55,8 @@ class Search {
 
   SearchResult run() {
     for (std::size_t c = 0; c < list_.candidates.size(); ++c)
-      if (list_.candidates[c].effect->certain(input_.log)) adopt_proven(c);
+      if (is_certain(list_.candidates[c]) && !is_proven_otherwise(list_.candidates[c]))
+        adopt_proven(c);
     // Where the best of the slow ones is superfluous as soon as it is there, so are the others.
     bool worth_slow_look = true;
     while (chosen_.size() < options_.max_effects) {
@@ -127,27 +128,12 @@ class Search {
         active.p[k] *= step(column++);
     return with_effect(std::move(start), active);
   }
-  /// What the codes prove joins the model. Its response may hang on the level of the axis more
-  /// finely than the level is known without it, so the level is searched for.
+  /// What the codes prove joins the model.
   void adopt_proven(std::size_t candidate) {
-    constexpr int kLevels = 16;
-    const Candidate& proven = list_.candidates[candidate];
-    EnlargedParameters best = with_effect(stage_.fit.parameters, proven.active());
-    const Eigen::VectorXd change = predict_means_V(input_.log, best)[proven.axis] -
-                                   predict_means_V(input_.log, stage_.fit.parameters)[proven.axis];
-    const double swing_V = change.maxCoeff() - change.minCoeff();
-    double best_chi2 = std::numeric_limits<double>::infinity();
-    const EnlargedParameters start = best;
-    for (int level = -kLevels; level <= kLevels; ++level) {
-      EnlargedParameters shifted = start;
-      shifted.twelve[proven.axis](3) += swing_V * level / kLevels;
-      const EnlargedFit with = fit(shifted);
-      if (!with.determined || !(with.chi2 < best_chi2)) continue;
-      best_chi2 = with.chi2;
-      best = with.parameters;
-    }
-    if (!adopt(best)) return;
-    choose(candidate, kProven);
+    const EnlargedFit with =
+        fit_from_levels(input_.log, stage_.observed, stage_.whitening,
+                        with_effect(stage_.fit.parameters, list_.candidates[candidate].active()));
+    if (with.determined && adopt(with.parameters)) choose(candidate, kProven);
   }
   EnlargedFit fit_without(const std::vector<std::size_t>& removed) const {
     EnlargedParameters fewer = stage_.fit.parameters;
@@ -226,6 +212,31 @@ class Search {
       }
     }
     if (winner == nullptr) return replace_overlapping(ranked, gains);
+    if (getenv("DBG")) {
+      const auto& c = list_.candidates[winner->candidate];
+      fprintf(stderr, "winner %s axis %zu p0 %g logp %g (first %g) coarse1 %d p %g\n",
+              std::string(c.effect->id()).c_str(), c.axis,
+              c.hypothesis.p.empty() ? 0. : c.hypothesis.p[0], winner_log_p, winner->log_p,
+              (int)c.of_one_coarse_reading, p_of_search(winner_log_p, looks_));
+      for (std::size_t k = 0; k < fits.size(); ++k)
+        fprintf(stderr, "  %s %zu gain %g first %g det %d\n",
+                std::string(list_.candidates[ranked[k].candidate].effect->id()).c_str(),
+                list_.candidates[ranked[k].candidate].axis, stage_.fit.chi2 - fits[k].chi2,
+                first_order(static_cast<Eigen::Index>(ranked[k].candidate)),
+                (int)fits[k].determined);
+      const auto before = predict_means_V(input_.log, stage_.fit.parameters);
+      const auto after = predict_means_V(input_.log, with_winner);
+      for (std::size_t i = 0; i < 3; ++i) {
+        Eigen::Index at;
+        (after[i] - before[i]).cwiseAbs().maxCoeff(&at);
+        fprintf(
+            stderr,
+            "  axis %zu change at %ld: %g raw %g freed %g own_sd %g sd %g step %g; chi2 %g\n", i,
+            (long)at, after[i](at) - before[i](at), input_.observed.mean_V[i](at) - before[i](at),
+            stage_.observed.mean_V[i](at) - before[i](at), std::sqrt(stage_.own_V2[i](at)),
+            std::sqrt(stage_.noise[i].covariance(at, at)), input_.log.step_V(i), stage_.fit.chi2);
+      }
+    }
     const double p = p_of_search(winner_log_p, looks_);
     if (p > options_.false_alarm || !adopt(with_winner)) return false;
     choose(winner->candidate, p);
@@ -359,9 +370,21 @@ class Search {
     return false;
   }
 
+  bool is_certain(const Candidate& candidate) const {
+    return candidate.effect->certain(input_.log);
+  }
+  /// Two effects that the codes of an axis prove are two names for one.
+  bool is_proven_otherwise(const Candidate& candidate) const {
+    return std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
+      const Candidate& chosen = list_.candidates[k];
+      return chosen.axis == candidate.axis && chosen.effect != candidate.effect &&
+             is_certain(chosen);
+    });
+  }
+
   /// An effect stands in the model once; a second pose, slip or step is another matter.
   bool is_chosen(const Candidate& candidate) const {
-    if (candidate.effect->certain(input_.log)) return true;  // in the model from the start
+    if (is_certain(candidate)) return true;  // in the model from the start
     return !candidate.effect->repeats() &&
            std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
              return list_.candidates[k].effect == candidate.effect &&
@@ -388,7 +411,7 @@ class Search {
   /// What a newcomer has made superfluous goes.
   void drop_superfluous() {
     for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
-      if (list_.candidates[chosen_[k]].effect->certain(input_.log)) continue;
+      if (is_certain(list_.candidates[chosen_[k]])) continue;
       const EnlargedFit without = fit_without({k});
       if (!without.determined || p_of_removal(without) < options_.false_alarm) continue;
       if (!adopt(without.parameters)) continue;
@@ -413,9 +436,8 @@ class Search {
     for (std::size_t k = 0; k < chosen_.size(); ++k)
       for (std::size_t l = k + 1; l < chosen_.size(); ++l) subsets.push_back({k, l});
     std::erase_if(subsets, [&](const std::vector<std::size_t>& subset) {
-      return std::any_of(subset.begin(), subset.end(), [&](std::size_t k) {
-        return list_.candidates[chosen_[k]].effect->certain(input_.log);
-      });
+      return std::any_of(subset.begin(), subset.end(),
+                         [&](std::size_t k) { return is_certain(list_.candidates[chosen_[k]]); });
     });
     responses();
     std::vector<std::vector<Exchange>> exchanges(subsets.size());

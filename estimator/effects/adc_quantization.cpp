@@ -17,14 +17,15 @@ class Quantization final : public Effect {
             {"noise", "V", ParameterRole::shape}};
   }
   double choice_uncertainty(const VisitLog& log, std::size_t axis, std::size_t k) const override {
-    return k == 0 && log.coarser_lattice[axis] ? log.coarser_lattice[axis]->u_step_V : 0;
+    return k == 0 && log.codes[axis].coarser_lattice ? log.codes[axis].coarser_lattice->u_step_V
+                                                     : 0;
   }
   // Against a declared step the codes prove a coarser one; without it they only suggest one.
   bool certain(const VisitLog& log) const override { return log.adc.has_value(); }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     // Without a declared converter the smallest difference between two readings is its step.
     const std::optional<Lattice> lattice =
-        log.adc ? log.coarser_lattice[axis]
+        log.adc ? log.codes[axis].coarser_lattice
                 : std::optional(Lattice{log.smallest_step_V[axis], log.lowest_V[axis]});
     // Noise of more than a step hides rounding from the means.
     if (!lattice || lattice->step_V == 0 || log.input_sd_V[axis] > 0.7 * lattice->step_V) return {};
@@ -49,7 +50,7 @@ class Quantization final : public Effect {
   /// What the declared converter makes of a point of the coarser lattice.
   static double reading_V(const TermInput& input, const double* p, double point) {
     const double at_V = p[1] + p[0] * point;
-    const auto& lattice = input.log.coarser_lattice[input.axis];
+    const auto& lattice = input.log.codes[input.axis].coarser_lattice;
     if (lattice && point >= 0 && point < static_cast<double>(lattice->second_rounding_V.size())) {
       const double second_V = lattice->second_rounding_V[static_cast<std::size_t>(point)];
       if (!std::isnan(second_V)) return at_V + second_V;

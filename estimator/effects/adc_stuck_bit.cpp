@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "estimator/effects/effect.h"
+#include "estimator/noise/covariance.h"
 
 namespace plumbline {
 namespace {
@@ -19,7 +20,7 @@ class StuckBitEffect final : public Effect {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
-    for (const StuckBit& stuck : log.stuck_bits[axis]) {
+    for (const StuckBit& stuck : log.codes[axis].stuck_bits) {
       const double noise_V = std::max(
           log.input_sd_V[axis], effect::kLeastNoise * std::ldexp(log.adc->lsb_V(), stuck.bit));
       starts.push_back({{static_cast<double>(stuck.bit), stuck.value ? 1.0 : 0.0, noise_V}});
@@ -43,7 +44,10 @@ class StuckBitEffect final : public Effect {
       if (is_set == set) continue;
       wrong += effect::share_below(from + 1, value, sd) - effect::share_below(from, value, sd);
     }
-    return (set ? wrong : -wrong) * size_V / input.K_V_per_g;
+    // The bit is lost after rounding, which such readings therefore are not freed of.
+    const double rounding_V =
+        rounding_bias(input.output_V, adc.min_V, adc.lsb_V(), std::abs(p[2])).bias;
+    return (rounding_V + (set ? wrong : -wrong) * size_V) / input.K_V_per_g;
   }
 };
 

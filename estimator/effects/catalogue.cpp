@@ -37,8 +37,9 @@ const std::vector<const Effect*>& effect_catalogue() {
   static const std::vector<const Effect*> catalogue = {
       &adc_code_step(),
       &adc_mains_pickup(),
-      &adc_quantization(),
+      // Where the codes prove either, the first of these two stands.
       &adc_stuck_bit(),
+      &adc_quantization(),
       &env_base_field(),
       &rig_axis_skew(),
       &rig_backlash(),

@@ -46,13 +46,24 @@ double log_choices(double n, double k) {
 
 }  // namespace
 
-std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc) {
+std::vector<std::int64_t> without_bits(const std::vector<std::int64_t>& codes,
+                                       const std::vector<StuckBit>& bits) {
+  std::vector<std::int64_t> left = codes;
+  // From the highest on, so that the places of the others stay.
+  for (auto bit = bits.rbegin(); bit != bits.rend(); ++bit)
+    for (std::int64_t& code : left)
+      code = (code >> (bit->bit + 1) << bit->bit) | (code & ((std::int64_t{1} << bit->bit) - 1));
+  return left;
+}
+
+std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc,
+                              const std::vector<StuckBit>& stuck) {
   constexpr std::size_t kReadingsPerCode = 4;  // at least, so that none is missing by chance
   std::size_t dwells = 0;
   for (const Pose& pose : set.poses) {
     const auto first = set.samples.u_V[axis].begin() + static_cast<std::ptrdiff_t>(pose.first);
-    const std::vector<std::int64_t> codes =
-        codes_seen({first, first + static_cast<std::ptrdiff_t>(pose.count)}, adc);
+    const std::vector<std::int64_t> codes = without_bits(
+        codes_seen({first, first + static_cast<std::ptrdiff_t>(pose.count)}, adc), stuck);
     if (pose.count < kReadingsPerCode * codes.size()) continue;
     const bool over = std::adjacent_find(codes.begin(), codes.end(),
                                          [](auto a, auto b) { return b - a > 1; }) != codes.end();
@@ -138,6 +149,22 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
         reading_V - lattice.origin_V - lattice.step_V * static_cast<double>(k);
   }
   return lattice;
+}
+
+CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& adc) {
+  const std::vector<std::int64_t> codes = codes_seen(set.samples.u_V[axis], adc);
+  CodeFaults faults{stuck_bits(codes, adc),
+                    coarser_lattice(codes, adc, dwells_over_codes(set, axis, adc))};
+  if (faults.stuck_bits.empty() || !faults.coarser_lattice) return faults;
+  if (coarser_lattice(without_bits(codes, faults.stuck_bits), adc,
+                      dwells_over_codes(set, axis, adc, faults.stuck_bits)))
+    faults.stuck_bits.clear();
+  else if (faults.stuck_bits.size() > 1 || faults.stuck_bits.front().bit > 0)
+    faults.coarser_lattice.reset();
+  else
+    faults.coarser_lattice = {
+        2 * adc.lsb_V(), adc.min_V + adc.lsb_V() * static_cast<double>(codes.front()), 0, {}};
+  return faults;
 }
 
 }  // namespace plumbline

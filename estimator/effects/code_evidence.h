@@ -34,14 +34,29 @@ struct Lattice {
   std::vector<double> second_rounding_V = {};
 };
 
-/// In how many dwells of `set` the readings of an axis step over a code of `adc`: most readings
-/// share few codes, and none lies between two of them. Noise of a sound converter does not do that.
-std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc);
+/// The codes with these bits left out, as if the converter had never had them: ascending.
+std::vector<std::int64_t> without_bits(const std::vector<std::int64_t>& codes,
+                                       const std::vector<StuckBit>& bits);
+
+/// In how many dwells of `set` the readings of an axis step over a code of `adc`, bits that are
+/// stuck left out: most readings share few codes, and none lies between two of them. Noise of a
+/// sound converter does not do that.
+std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc,
+                              const std::vector<StuckBit>& stuck = {});
 
 /// The lattice, coarser than that of the declared converter, whose points lie within half a
 /// declared step of every reading; empty when chance could put them there (more often than once in
 /// 10⁶) or nothing coarser shows. Every one of `dwells_over_codes` counts as even odds besides.
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
                                        std::size_t dwells_over_codes = 0);
+
+/// What the codes of one axis show. A coarser step often leaves a bit without change, and a bit
+/// without change leaves codes out as a coarser step does: the one that explains the other is
+/// there. Only a lowest bit alone and a step of twice the size are the same, and both are told.
+struct CodeFaults {
+  std::vector<StuckBit> stuck_bits;
+  std::optional<Lattice> coarser_lattice;
+};
+CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& adc);
 
 }  // namespace plumbline

@@ -57,12 +57,12 @@ double quiet_scatter_V(const MeasurementSet& set, std::size_t axis) {
 /// White noise before the converter.
 double input_scatter_V(const MeasurementSet& set, const VisitLog& log, std::size_t axis) {
   const double lsb_V = log.adc->lsb_V();
-  if (log.stuck_bits[axis].empty()) {
-    const auto& lattice = log.coarser_lattice[axis];
+  if (log.codes[axis].stuck_bits.empty()) {
+    const auto& lattice = log.codes[axis].coarser_lattice;
     return sd_before_rounding_V(lattice ? lattice->step_V : lsb_V, log.sample_sd_V[axis]);
   }
   // Without its lowest bit a converter has steps of twice the size.
-  if (log.stuck_bits[axis].front().bit == 0)
+  if (log.codes[axis].stuck_bits.front().bit == 0)
     return sd_before_rounding_V(2 * lsb_V, log.sample_sd_V[axis]);
   return sd_before_rounding_V(lsb_V, quiet_scatter_V(set, axis));
 }
@@ -120,9 +120,9 @@ std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
 }
 
 double VisitLog::step_V(std::size_t axis) const {
-  if (coarser_lattice[axis]) return coarser_lattice[axis]->step_V;
+  if (codes[axis].coarser_lattice) return codes[axis].coarser_lattice->step_V;
   int missing = 0;
-  for (const StuckBit& stuck : stuck_bits[axis]) missing = std::max(missing, stuck.bit + 1);
+  for (const StuckBit& stuck : codes[axis].stuck_bits) missing = std::max(missing, stuck.bit + 1);
   return std::ldexp(adc->lsb_V(), missing);
 }
 
@@ -167,10 +167,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
     if (log.adc) {
-      const std::vector<std::int64_t> codes = codes_seen(samples.u_V[i], *log.adc);
-      log.stuck_bits[i] = stuck_bits(codes, *log.adc);
-      log.coarser_lattice[i] =
-          coarser_lattice(codes, *log.adc, dwells_over_codes(set, i, *log.adc));
+      log.codes[i] = code_faults(set, i, *log.adc);
       log.input_sd_V[i] = input_scatter_V(set, log, i);
     }
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);

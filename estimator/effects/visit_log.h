@@ -42,8 +42,7 @@ struct VisitLog {
   PerAxis<double> sample_sd_V{};             ///< white noise of one sample, within the dwells
   /// The same before the converter: freed of what rounding and stuck bits do to it.
   PerAxis<double> input_sd_V{};
-  PerAxis<std::vector<StuckBit>> stuck_bits;        ///< that the codes show
-  PerAxis<std::optional<Lattice>> coarser_lattice;  ///< than declared, that the codes show
+  PerAxis<CodeFaults> codes;                ///< where a converter is declared
   PerAxis<double> smallest_step_V{};        ///< smallest difference between two different readings
   PerAxis<double> lowest_V{}, highest_V{};  ///< of all readings
   std::optional<Adc> adc;

@@ -69,6 +69,15 @@ double sigma_at(const Eigen::ArrayXd& values, double recorded_variance, double u
   return 0.5 * (low + high);
 }
 
+/// The most that rounding takes from or adds to a mean of readings with noise `sigma_V`.
+double largest_bias_V(double step_V, double sigma_V) {
+  constexpr int kPlaces = 32;
+  double largest_V = 0;
+  for (int k = 0; k < kPlaces; ++k)
+    largest_V = std::max(largest_V, rounding_bias(step_V * k / kPlaces, 0, step_V, sigma_V).bias);
+  return largest_V;
+}
+
 }  // namespace
 
 double sd_before_rounding_V(double step_V, double recorded_V) {
@@ -112,6 +121,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
       step_V * sigma_at((expected_V.array() - origin_V) / step_V, recorded_V2 / (step_V * step_V),
                         sigma_V / step_V, std::sqrt(slow_V2) / step_V);
   white_V2 = sigma_V * sigma_V;
+  const double most_V = largest_bias_V(step_V, sigma_V);
   for (int round = 0; round < 4; ++round) {
     // On the flats of the staircase undoing it to first order would blow up what is not of first
     // order.
@@ -125,10 +135,14 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
           rounding_bias(expected_V(k), origin_V, step_V, std::sqrt(white_V2 + slow_V2));
       const double slope = std::max(1 + bias.slope, kFlattest);
       const double off_V = mean_V(k) - expected_V(k) - bias.bias;
-      trial.mean_V(k) = expected_V(k) + off_V / slope;
       const double white_mean_V2 = step_V * step_V / samples_per_mean *
                                    rounded_variance((expected_V(k) - origin_V) / step_V,
                                                     sigma_V / step_V, std::sqrt(slow_V2) / step_V);
+      // Far from the expectation the slope there says nothing: rounding moves no mean further than
+      // it moves any.
+      const double reach_V = most_V + std::sqrt(white_mean_V2);
+      trial.mean_V(k) =
+          std::clamp(expected_V(k) + off_V / slope, mean_V(k) - reach_V, mean_V(k) + reach_V);
       trial.variance_V2(k) = (white_mean_V2 + left_V2) / (slope * slope);
       raw_V2 += off_V * off_V / static_cast<double>(n);
       slow_sum_V2 += (off_V * off_V - white_mean_V2 - left_V2) / static_cast<double>(n);
