@@ -268,35 +268,43 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
 
 namespace {
 
-/// Values of one axis's parameters by name; false when an index or shape is missing.
-bool fill(const Effect& effect, const std::vector<EffectParameter>& reported,
-          std::optional<std::size_t> axis, ActiveEffect& active) {
+/// The instances of an effect on one axis (or the head), one after the other: a parameter that was
+/// there already begins the next. Without those that lack an index or a shape.
+std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
+                                    const std::vector<EffectParameter>& reported) {
   const auto infos = effect.parameters();
-  active.p.assign(infos.size(), 0);
-  active.free.assign(infos.size(), false);
-  for (std::size_t k = 0; k < infos.size(); ++k) {
-    const auto it = std::find_if(reported.begin(), reported.end(), [&](const EffectParameter& p) {
-      return p.name == infos[k].name && (!axis || p.axis == axis);
+  std::vector<std::vector<std::optional<double>>> values;
+  for (const EffectParameter& parameter : reported) {
+    if (parameter.axis && *parameter.axis != axis) continue;
+    const auto info = std::find_if(infos.begin(), infos.end(), [&](const ParameterInfo& i) {
+      return i.name == parameter.name;
     });
-    if (it != reported.end()) {
-      active.p[k] = it->value;
-    } else if (infos[k].role != ParameterRole::amplitude) {
-      return false;
-    }
+    if (info == infos.end()) continue;
+    const auto k = static_cast<std::size_t>(info - infos.begin());
+    if (values.empty() || values.back()[k]) values.emplace_back(infos.size());
+    values.back()[k] = parameter.value;
   }
-  return true;
+  std::vector<ActiveEffect> found;
+  for (const auto& value : values) {
+    ActiveEffect active{&effect, axis, std::vector<double>(infos.size()),
+                        std::vector<bool>(infos.size(), false)};
+    bool whole = true;
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      active.p[k] = value[k].value_or(0);
+      whole = whole && (value[k] || infos[k].role == ParameterRole::amplitude);
+    }
+    if (whole) found.push_back(std::move(active));
+  }
+  return found;
 }
 
 void restore(const Effect& effect, const std::vector<std::size_t>& axes,
              const std::vector<EffectParameter>& reported, EnlargedParameters& model) {
   if (!effect.carries_over()) return;
   const bool head = effect.subject() == Subject::head;
-  for (std::size_t axis : head ? std::vector<std::size_t>{0} : axes) {
-    ActiveEffect active{&effect, axis, {}, {}};
-    if (fill(effect, reported, head ? std::nullopt : std::optional(axis), active)) {
+  for (std::size_t axis : head ? std::vector<std::size_t>{0} : axes)
+    for (ActiveEffect& active : instances(effect, axis, reported))
       model.effects.push_back(std::move(active));
-    }
-  }
 }
 
 }  // namespace

@@ -39,8 +39,12 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
     }
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
     if (infos[k].role == ParameterRole::index && infos[k].unit == "s") {
-      // The instant lies somewhere between the last sample before and the first one after.
+      // The instant lies somewhere between the last sample before and the first one after, or in a
+      // part of a dwell.
       for (std::size_t v = 1; v < log.visits.size(); ++v) {
+        if (log.visits[v].t_arrival_s < active.p[k])
+          parameter.u = log.visits[v].step_s * static_cast<double>(log.visits[v].count) /
+                        (effect::kPartsOfDwell * std::sqrt(12.0));
         if (log.visits[v].t_arrival_s != active.p[k]) continue;
         const Visit& before = log.visits[v - 1];
         const double end_s =

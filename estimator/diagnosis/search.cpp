@@ -399,6 +399,26 @@ class Search {
   void choose(std::size_t candidate, double p) {
     chosen_.push_back(candidate);
     p_values_.push_back(p);
+    look_closer();
+  }
+
+  /// Puts one of those close to the newcomer in its place that explains clearly more.
+  void look_closer() {
+    constexpr double kClearly = 10;
+    const ActiveEffect& newcomer = stage_.fit.parameters.effects.back();
+    const std::vector<Hypothesis> closer = newcomer.effect->closer(input_.log, {newcomer.p});
+    std::vector<EnlargedFit> fits(closer.size());
+    parallel_for(fits.size(), [&](std::size_t k) {
+      EnlargedParameters model = stage_.fit.parameters;
+      model.effects.back().p = closer[k].p;
+      fits[k] = fit(model);
+    });
+    const EnlargedFit* best = nullptr;
+    for (const EnlargedFit& with : fits)
+      if (with.determined && with.chi2 < stage_.fit.chi2 - kClearly &&
+          (best == nullptr || with.chi2 < best->chi2))
+        best = &with;
+    if (best != nullptr) adopt(best->parameters);
   }
 
   double p_of_removal(const EnlargedFit& without) const {

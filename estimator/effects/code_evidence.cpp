@@ -73,9 +73,8 @@ std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const
 }
 
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
-                                       std::size_t dwells_over_codes) {
+                                       std::size_t dwells_over_codes, double chance) {
   constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
-  constexpr double kChance = 1e-6;
   if (codes.size() < 5) return {};
   // In declared steps from the lowest code. Rounding twice leaves half a step either way.
   const double range = static_cast<double>(codes.back() - codes.front());
@@ -134,7 +133,7 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   const double log_chance = std::log(lattices) + log_choices(allowed * points, seen) -
                             log_choices(range + 1, seen) +
                             static_cast<double>(dwells_over_codes) * std::log(0.5);
-  if (log_chance > std::log(kChance)) return {};
+  if (log_chance > std::log(chance)) return {};
   const double lsb_V = adc.lsb_V();
   Lattice lattice{step * lsb_V,
                   adc.min_V + lsb_V * (static_cast<double>(codes.front()) + fit(step).middle),
@@ -156,8 +155,10 @@ CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& a
   CodeFaults faults{stuck_bits(codes, adc),
                     coarser_lattice(codes, adc, dwells_over_codes(set, axis, adc))};
   if (faults.stuck_bits.empty() || !faults.coarser_lattice) return faults;
+  constexpr double kWithoutBits =
+      1e-3;  // that something is wrong is certain; what, is the question
   if (coarser_lattice(without_bits(codes, faults.stuck_bits), adc,
-                      dwells_over_codes(set, axis, adc, faults.stuck_bits)))
+                      dwells_over_codes(set, axis, adc, faults.stuck_bits), kWithoutBits))
     faults.stuck_bits.clear();
   else if (faults.stuck_bits.size() > 1 || faults.stuck_bits.front().bit > 0)
     faults.coarser_lattice.reset();

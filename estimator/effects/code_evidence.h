@@ -45,10 +45,10 @@ std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const
                               const std::vector<StuckBit>& stuck = {});
 
 /// The lattice, coarser than that of the declared converter, whose points lie within half a
-/// declared step of every reading; empty when chance could put them there (more often than once in
-/// 10⁶) or nothing coarser shows. Every one of `dwells_over_codes` counts as even odds besides.
+/// declared step of every reading; empty when chance could put them there more often than `chance`
+/// or nothing coarser shows. Every one of `dwells_over_codes` counts as even odds besides.
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
-                                       std::size_t dwells_over_codes = 0);
+                                       std::size_t dwells_over_codes = 0, double chance = 1e-6);
 
 /// What the codes of one axis show. A coarser step often leaves a bit without change, and a bit
 /// without change leaves codes out as a coarser step does: the one that explains the other is

@@ -65,6 +65,9 @@ class Effect {
   /// Starting points on these data for `axis` (0 for the head); empty when the data cannot show the
   /// effect at all (no temperature recorded, say).
   virtual std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const = 0;
+  /// Hypotheses close to `hypothesis`, too many to search among all the others; the one that the
+  /// search chose is compared with these.
+  virtual std::vector<Hypothesis> closer(const VisitLog&, const Hypothesis&) const { return {}; }
   /// Head: moves the geometry of visit `visit`.
   virtual void displace(const VisitLog& log, std::size_t visit, const double* p,
                         HeadGeometry& head) const;
@@ -97,6 +100,8 @@ namespace effect {
 
 inline constexpr double kRadPerDeg = 0.017453292519943295;
 inline constexpr double kTurn_rad = 360 * kRadPerDeg;
+/// Instants within a dwell are looked for in so many parts of it.
+inline constexpr std::size_t kPartsOfDwell = 8;
 /// Typical sizes that a search starts from, small against 1 g.
 inline constexpr double kSmallTerm = 1e-3;
 inline constexpr double kSmallAngle_deg = 0.02;

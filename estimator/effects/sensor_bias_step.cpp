@@ -1,9 +1,13 @@
+#include <algorithm>
+#include <cmath>
+
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
 namespace {
 
-// Bias that jumps once: b for t ≥ t0. Between two poses the instant cannot be told.
+// Bias that jumps once: b for t ≥ t0. Between two poses the instant cannot be told; a jump while
+// the head rests shows in part of the samples.
 class BiasStep final : public Effect {
  public:
   std::string id() const override { return "sensor.bias_step"; }
@@ -19,8 +23,33 @@ class BiasStep final : public Effect {
     }
     return starts;
   }
+  std::vector<Hypothesis> closer(const VisitLog& log, const Hypothesis& found) const override {
+    std::vector<Hypothesis> within;
+    for (std::size_t k = 0; k < log.visits.size(); ++k) {
+      const bool after = log.visits[k].t_arrival_s == found.p[1];
+      const bool before = k + 1 < log.visits.size() && log.visits[k + 1].t_arrival_s == found.p[1];
+      if (!after && !before) continue;
+      const Visit& visit = log.visits[k];
+      for (std::size_t part = 1; part < effect::kPartsOfDwell; ++part) {
+        const auto sample = static_cast<double>(visit.count * part / effect::kPartsOfDwell);
+        within.push_back({{found.p[0], visit.t_arrival_s + visit.step_s * sample}});
+      }
+    }
+    return within;
+  }
   double term_g(const TermInput& input, const double* p) const override {
-    return input.at().t_mean_s >= p[1] ? p[0] : 0;
+    return p[0] * share_from(input.at(), p[1]);
+  }
+
+ private:
+  /// Share of the samples of a visit at or after an instant.
+  static double share_from(const Visit& visit, double t_s) {
+    if (t_s <= visit.t_arrival_s) return 1;
+    if (visit.count < 2) return 0;
+    constexpr double kSame = 1e-6;  // of the time between samples
+    const auto count = static_cast<double>(visit.count);
+    const double before = std::ceil((t_s - visit.t_arrival_s) / visit.step_s - kSame);
+    return std::max(0.0, count - before) / count;
   }
 };
 

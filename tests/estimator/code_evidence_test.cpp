@@ -122,6 +122,58 @@ TEST(CodeEvidence, LowestBitsAllClearAreACoarserStep) {
   EXPECT_NEAR(lattice->step_V, 8 * kSixteenBits.lsb_V(), 1e-6);
 }
 
+constexpr Adc kTwelveBits{12, -5, 0};
+
+// Poses all over 80 mV with little noise, each code as `fault` makes it.
+MeasurementSet poses_with(std::int64_t (*fault)(std::int64_t code)) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> noise(0, 0.25);
+  MeasurementSet set;
+  for (int k = 0; k < 300; ++k) {
+    set.poses.push_back({k, 0, 0, set.samples.size(), 40});
+    const double steps = 1950 + 33 * std::sin(0.37 * k);
+    for (int i = 0; i < 40; ++i)
+      for (auto& u_V : set.samples.u_V)
+        u_V.push_back(-5 + kTwelveBits.lsb_V() *
+                               static_cast<double>(fault(std::llround(steps + noise(random)))));
+  }
+  return set;
+}
+
+TEST(CodeFaults, AStuckBitIsNoCoarserStep) {
+  for (const auto fault : {+[](std::int64_t code) { return code | 2; },
+                           +[](std::int64_t code) { return code & ~std::int64_t{4}; }}) {
+    const CodeFaults faults = code_faults(poses_with(fault), 0, kTwelveBits);
+    EXPECT_EQ(faults.stuck_bits.size(), 1U);
+    EXPECT_FALSE(faults.coarser_lattice);
+  }
+}
+
+TEST(CodeFaults, ACoarserStepIsNoStuckBit) {
+  // Steps of six: bit 0 never changes either.
+  const CodeFaults faults =
+      code_faults(poses_with([](std::int64_t code) { return (code + 3) / 6 * 6; }), 0, kTwelveBits);
+  EXPECT_TRUE(faults.stuck_bits.empty());
+  ASSERT_TRUE(faults.coarser_lattice);
+  EXPECT_NEAR(faults.coarser_lattice->step_V, 6 * kTwelveBits.lsb_V(), 2e-5);
+}
+
+TEST(CodeFaults, TheLowestBitAloneIsAlsoAStepOfTwiceTheSize) {
+  const CodeFaults faults =
+      code_faults(poses_with([](std::int64_t code) { return code | 1; }), 0, kTwelveBits);
+  ASSERT_EQ(faults.stuck_bits.size(), 1U);
+  EXPECT_EQ(faults.stuck_bits.front().bit, 0);
+  ASSERT_TRUE(faults.coarser_lattice);
+  EXPECT_DOUBLE_EQ(faults.coarser_lattice->step_V, 2 * kTwelveBits.lsb_V());
+}
+
+TEST(CodeFaults, ASoundConverterHasNone) {
+  const CodeFaults faults =
+      code_faults(poses_with([](std::int64_t code) { return code; }), 0, kTwelveBits);
+  EXPECT_TRUE(faults.stuck_bits.empty());
+  EXPECT_FALSE(faults.coarser_lattice);
+}
+
 // 200 dwells of 40 samples at 100 Hz with white noise, every 6.4 s as a raster has them.
 MeasurementSet dwells(std::uint64_t seed, double amplitude_V, double f_hz, double phase_rad) {
   std::mt19937_64 random(seed);

@@ -93,6 +93,36 @@ TEST(Findings, WhatHappenedOnceIsNoSlowNoise) {
   EXPECT_LT(result.after.fit_pose_rms_mps2[0], 1.2 * result.floor_pose_rms_mps2[0]);
 }
 
+TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
+  // Pose 20 of 60 comes at 121 s and has 20 samples, 3/8 of them before the step.
+  SyntheticOptions options;
+  options.more_x_V = [](double, double t_s) { return t_s < 121.0749 ? 0 : 2e-3; };
+  const Calibration result = calibrated(synthetic_run(6, kSixteenBits, options));
+  ASSERT_EQ(result.diagnosis.effects.size(), 1U) << result.diagnosis.reason;
+  const FoundEffect& step = result.diagnosis.effects.front();
+  EXPECT_EQ(step.id, "sensor.bias_step");
+  ASSERT_EQ(step.parameters.size(), 2U);
+  EXPECT_NEAR(step.parameters[1].value, 121.075, 4 * step.parameters[1].u);
+  EXPECT_GT(step.parameters[1].u, 0);
+  EXPECT_LT(step.parameters[1].u, 0.01);
+}
+
+TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
+  const SyntheticRun before = synthetic_run(7, kSixteenBits);
+  SyntheticOptions options;
+  options.more_x_V = [](double, double t_s) {
+    return (t_s < 120 ? 0 : 2e-3) + (t_s < 180 ? 0 : 3e-3);
+  };
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.diagnosis.effects.size(), 1U) << result.diagnosis.reason;
+  EXPECT_EQ(result.diagnosis.effects.front().parameters.size(), 4U);
+  const CertifiedModel model{result.estimates.batch_ls, result.final.batch_ls,
+                             result.diagnosis.effects, result.diagnosis.unlisted};
+  const Evaluation evaluation = evaluate(model, data.run, data.description);
+  EXPECT_LT(evaluation.after.pose_rms_mps2[0], 1.3 * result.floor_pose_rms_mps2[0]);
+}
+
 TEST(DetectionLimits, StandForEverythingThatWasNotFound) {
   const SyntheticRun data = synthetic_run(2, kSixteenBits);
   const Calibration result = calibrated(data);

@@ -9,6 +9,8 @@
 
 #include "estimator/calibrate.h"
 #include "estimator/fit/least_squares.h"
+#include "estimator/fit/rounding.h"
+#include "estimator/noise/covariance.h"
 #include "estimator/quantization/interval_fit.h"
 #include "tests/estimator/synthetic_run.h"
 
@@ -99,6 +101,24 @@ TEST(IntervalFit, ManyTimesBetterThanLeastSquaresWhereStepsAreCoarse) {
   const Errors tenth = errors_of({0.1, 100}, 4);
   EXPECT_LT(tenth.intervals, 2.2);
   EXPECT_LT(tenth.intervals, 0.3 * tenth.least_squares);
+}
+
+TEST(RoundingFree, MovesNoMeanByMoreThanRoundingDoes) {
+  // A pose half a step off its expectation, where the staircase is flat: its mean is wrong by no
+  // more than rounding with noise of 0.25 steps makes any mean wrong, 0.093 steps, and its own
+  // noise.
+  constexpr Adc adc{12, -5, 0};
+  const double step_V = adc.lsb_V();
+  Eigen::VectorXd expected_V(200), mean_V(200);
+  for (Eigen::Index k = 0; k < 200; ++k) {
+    expected_V(k) = -2.5 + step_V * 0.137 * static_cast<double>(k);
+    mean_V(k) = expected_V(k) + rounding_bias(expected_V(k), -2.5, step_V, 0.25 * step_V).bias;
+  }
+  expected_V(0) = -2.5;  // in the middle of a code
+  mean_V(0) = -2.5 + 0.7 * step_V;
+  const RoundingFree free = free_of_rounding(mean_V, expected_V, adc, 0.36 * step_V, 50);
+  ASSERT_TRUE(free.coarse);
+  EXPECT_LT(std::abs(free.mean_V(0) - mean_V(0)), 0.2 * step_V);
 }
 
 TEST(IntervalFit, AsGoodAsLeastSquaresWhereNoiseSmoothsTheSteps) {
