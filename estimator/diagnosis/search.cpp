@@ -212,31 +212,6 @@ class Search {
       }
     }
     if (winner == nullptr) return replace_overlapping(ranked, gains);
-    if (getenv("DBG")) {
-      const auto& c = list_.candidates[winner->candidate];
-      fprintf(stderr, "winner %s axis %zu p0 %g logp %g (first %g) coarse1 %d p %g\n",
-              std::string(c.effect->id()).c_str(), c.axis,
-              c.hypothesis.p.empty() ? 0. : c.hypothesis.p[0], winner_log_p, winner->log_p,
-              (int)c.of_one_coarse_reading, p_of_search(winner_log_p, looks_));
-      for (std::size_t k = 0; k < fits.size(); ++k)
-        fprintf(stderr, "  %s %zu gain %g first %g det %d\n",
-                std::string(list_.candidates[ranked[k].candidate].effect->id()).c_str(),
-                list_.candidates[ranked[k].candidate].axis, stage_.fit.chi2 - fits[k].chi2,
-                first_order(static_cast<Eigen::Index>(ranked[k].candidate)),
-                (int)fits[k].determined);
-      const auto before = predict_means_V(input_.log, stage_.fit.parameters);
-      const auto after = predict_means_V(input_.log, with_winner);
-      for (std::size_t i = 0; i < 3; ++i) {
-        Eigen::Index at;
-        (after[i] - before[i]).cwiseAbs().maxCoeff(&at);
-        fprintf(
-            stderr,
-            "  axis %zu change at %ld: %g raw %g freed %g own_sd %g sd %g step %g; chi2 %g\n", i,
-            (long)at, after[i](at) - before[i](at), input_.observed.mean_V[i](at) - before[i](at),
-            stage_.observed.mean_V[i](at) - before[i](at), std::sqrt(stage_.own_V2[i](at)),
-            std::sqrt(stage_.noise[i].covariance(at, at)), input_.log.step_V(i), stage_.fit.chi2);
-      }
-    }
     const double p = p_of_search(winner_log_p, looks_);
     if (p > options_.false_alarm || !adopt(with_winner)) return false;
     choose(winner->candidate, p);
