@@ -49,6 +49,36 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
   return sd_V;
 }
 
+/// Variance that the model's prediction of each mean has because it is made where the axis would be
+/// without slow noise: near a step of the response (a code, a limit) noise of `sd_V` decides on
+/// which side a visit is. Beyond the variance of the noise itself.
+Eigen::VectorXd crossing_variance_V2(const VisitLog& log, const EnlargedParameters& parameters,
+                                     std::size_t axis, const Eigen::VectorXd& predicted_V,
+                                     double sd_V) {
+  constexpr int kPlaces = 5;      // on either side
+  constexpr double kApart = 0.5;  // standard deviations
+  Eigen::VectorXd square_V2 = Eigen::VectorXd::Zero(predicted_V.size());
+  double weights = 1, plain_V2 = 0;
+  for (int place = -kPlaces; place <= kPlaces; ++place) {
+    if (place == 0) continue;
+    EnlargedParameters shifted = parameters;
+    const double away = kApart * place;
+    shifted.twelve[axis](3) += away * sd_V;
+    const double weight = std::exp(-0.5 * away * away);
+    square_V2 += weight * (predict_means_V(log, shifted)[axis] - predicted_V).cwiseAbs2();
+    plain_V2 += weight * std::pow(away * sd_V, 2);
+    weights += weight;
+  }
+  return ((square_V2.array() - plain_V2) / weights).max(0);
+}
+
+bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
+  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
+                     [axis](const ActiveEffect& active) {
+                       return active.effect->subject() == Subject::sensor && active.axis == axis;
+                     });
+}
+
 }  // namespace
 
 PerAxis<const PooledNoise*> all_of(const PerAxis<PooledNoise>& noise) {
@@ -89,13 +119,27 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       columns.leftCols(jacobian.cols()) = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
       if (beside.cols() > 0) columns.rightCols(beside.cols()) = beside;
       const Eigen::MatrixXd design = independent_columns(columns);
-      const NoisePool pool(input.processes,
-                           free.coarse || input.log.codes[i].coarser_lattice
-                               ? without_record(input.noise[i])
-                               : input.noise[i],
-                           input.positioning_V2[i] + free.variance_V2);
-      stage.noise[i] = pool.pool(mean_V - predicted[i], design,
-                                 before.start != nullptr ? &(*before.start)[i].power : nullptr);
+      const NoiseModel record = free.coarse || input.log.codes[i].coarser_lattice
+                                    ? without_record(input.noise[i])
+                                    : input.noise[i];
+      const auto pool = [&](const Eigen::VectorXd& own_V2) {
+        return NoisePool(input.processes, record, own_V2)
+            .pool(mean_V - predicted[i], design,
+                  before.start != nullptr ? &(*before.start)[i].power : nullptr);
+      };
+      const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2;
+      stage.noise[i] = pool(own_V2);
+      // Where the response is nothing but steps, only the visits near their edges say anything.
+      if (has_effect_on(parameters, i) && !input.log.codes[i].coarser_lattice) {
+        constexpr double kMatters = 0.1;
+        const double mean_V2 = stage.noise[i].covariance.diagonal().mean();
+        const Eigen::VectorXd crossing_V2 =
+            crossing_variance_V2(input.log, parameters, i, predicted[i], std::sqrt(mean_V2));
+        if (crossing_V2.maxCoeff() > kMatters * mean_V2) {
+          stage.crossing_V2[i] = crossing_V2;
+          stage.noise[i] = pool(own_V2 + crossing_V2);
+        }
+      }
     }
     if (free.coarse && !freed) {
       free_means(predicted[i] +

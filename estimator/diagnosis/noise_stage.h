@@ -12,6 +12,9 @@ struct Stage {
   Observations observed;            ///< freed of rounding as this model sees it
   PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
   PerAxis<bool> coarse{};           ///< rounding matters
+  /// Further variance, in `noise` too, of means near a step of the response: slow noise decides on
+  /// which side they are. Empty where it does not matter.
+  PerAxis<Eigen::VectorXd> crossing_V2;
   EnlargedFit fit;
   PerAxis<PooledNoise> noise;
   PoseWhitening whitening;

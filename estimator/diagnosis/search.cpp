@@ -149,6 +149,9 @@ class Search {
         before.known[axis] = &stage_.noise[axis];
     Stage next = settle(input_, parameters, before);
     if (!next.fit.determined) return false;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (before.known[axis] != nullptr)
+        next.crossing_V2[axis] = std::move(stage_.crossing_V2[axis]);
     stage_ = std::move(next);
     noise_is_own_ = true;
     responses_.reset();
@@ -504,6 +507,8 @@ class Search {
     result.fit = std::move(stage_.fit);
     result.observed = std::move(stage_.observed);
     result.own_V2 = std::move(stage_.own_V2);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (stage_.crossing_V2[axis].size() > 0) result.own_V2[axis] += stage_.crossing_V2[axis];
     result.noise = std::move(stage_.noise);
     result.whitening = std::move(stage_.whitening);
     result.p_best_rest = p_best_rest_;

@@ -40,6 +40,32 @@ TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
   EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
 }
 
+// Near the boundary slow noise decides on which side of the step a pose is: no pose is wrong there.
+TEST(DiagnosisStudy, ACodeStepInSlowNoiseIsNamedAndNoPoseIsBlamed) {
+  const SetOutcome outcome = run_set({.seed = 73002,
+                                      .effects = {"adc.code_step"},
+                                      .size = 10,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 12});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
+TEST(DiagnosisStudy, AStuckBitOfACoarseConverterIsTheOnlyFinding) {
+  const SetOutcome outcome = run_set({.seed = 74003,
+                                      .effects = {"adc.stuck_bit"},
+                                      .size = 10,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 12});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.5 * outcome.oracle.fresh);
+}
+
 // The covariance that the oracle uses is the one that the simulated noise has.
 TEST(DiagnosisStudy, TrueCovariancePredictsTheResidualOfPlainSets) {
   for (const NoiseKind kind : {NoiseKind::white, NoiseKind::examples, NoiseKind::coloured}) {
