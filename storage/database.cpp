@@ -157,11 +157,13 @@ tl::unexpected<Error> Database::failure_of(int code) const {
   // SQLite keeps errno itself, except for what fails in a COMMIT; there errno is still as it was.
   int os_error = connection_ == nullptr ? 0 : sqlite3_system_errno(connection_);
   if (os_error == 0) os_error = last_errno;
-  if (os_error != 0 &&
-      (primary == SQLITE_IOERR || primary == SQLITE_FULL || primary == SQLITE_CANTOPEN)) {
+  const bool of_the_disk =
+      primary == SQLITE_IOERR || primary == SQLITE_FULL || primary == SQLITE_CANTOPEN;
+  if (os_error != 0 && of_the_disk) {
     text += fmt::format(" ({})", std::generic_category().message(os_error));
   }
-  if (primary == SQLITE_FULL) text += "; free some space and resume";
+  const bool no_room = of_the_disk && (os_error == ENOSPC || os_error == EDQUOT);
+  if (primary == SQLITE_FULL || no_room) text += "; free some space and resume";
   return failure(text);
 }
 

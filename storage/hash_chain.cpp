@@ -140,6 +140,9 @@ Result<ChainReport> check_chain(const Database& database, RunId run) {
           (is_first ? "the description of the run was, or a pose" : "something") +
           " before it was changed, removed or inserted");
     }
+    if (!pose.consistent) {
+      report.faults.push_back(name + ": its times or its count are not those of its samples");
+    }
     last = from_hex(pose.link);  // so that one fault is reported once
   });
   if (!done) return fail(done.error());
@@ -151,12 +154,34 @@ Result<ChainReport> check_chain(const Database& database, RunId run) {
       },
       run);
   if (!done) return fail(done.error());
+  done = database.each(
+      "SELECT ordinal FROM suspect JOIN pose ON pose.id = suspect.pose WHERE run = ?1 AND NOT "
+      "EXISTS"
+      " (SELECT 1 FROM event WHERE event.run = ?1 AND kind = 'suspect' AND instr(text, why) > 0)",
+      [&](const Statement& row) {
+        report.faults.push_back(
+            fmt::format("pose {}: was taken out of the run, and no event says so", row.integer(0)));
+      },
+      run);
+  if (!done) return fail(done.error());
   if (to_hex(last) != summary->chain_head) {
     report.faults.push_back(
         "the last pose does not carry the head of the chain: poses were removed or added at the "
         "end, or the head was changed");
   }
   return report;
+}
+
+Result<std::vector<RunId>> removed_runs(const Database& database) {
+  std::vector<RunId> removed;
+  const auto done = database.each(
+      "WITH RECURSIVE number (id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM number WHERE id <"
+      " (SELECT max(seq) FROM sqlite_sequence WHERE name = 'run'))"
+      " SELECT id FROM number WHERE id NOT IN (SELECT id FROM run) AND"
+      " EXISTS (SELECT 1 FROM sqlite_sequence WHERE name = 'run')",
+      [&](const Statement& row) { removed.push_back(row.integer(0)); });
+  if (!done) return fail(done.error());
+  return removed;
 }
 
 Result<void> link_older_runs(const Database& database) {

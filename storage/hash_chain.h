@@ -33,6 +33,9 @@ std::string to_hex(Bytes hash);
 /// Checks one run as of one instant.
 Result<ChainReport> check_chain(const Database& database, RunId run);
 
+/// Numbers that were given to runs which are not there any more: runs are numbered without a gap.
+Result<std::vector<RunId>> removed_runs(const Database& database);
+
 /// For runs recorded before there was a chain: computes their links from what they hold now.
 Result<void> link_older_runs(const Database& database);
 

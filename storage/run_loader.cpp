@@ -218,7 +218,7 @@ Result<void> each_pose(const Database& database, RunId run,
   return database.each(
       "SELECT pose.id, ordinal, kind, delta_deg, h_deg, delta_enc_deg, h_enc_deg, settle_s,"
       " settle_capped, approach, samples, coalesce(link.hash, x''),"
-      " pose.id IN (SELECT pose FROM suspect) FROM pose"
+      " pose.id IN (SELECT pose FROM suspect), first_t_s, last_t_s, sample_count FROM pose"
       " LEFT JOIN link ON link.pose = pose.id WHERE pose.run = ?1 ORDER BY pose.id",
       [&](const Statement& row) {
         StoredPose pose;
@@ -236,6 +236,10 @@ Result<void> each_pose(const Database& database, RunId run,
         pose.record.covariates = std::move((*covariates)[pose.id]);
         pose.link = to_hex(row.bytes(11));
         pose.suspect = row.integer(12) != 0;
+        const std::vector<RawSample>& samples = pose.record.samples;
+        pose.consistent = !samples.empty() && samples.front().t_s == row.real(13) &&
+                          samples.back().t_s == row.real(14) &&
+                          std::ssize(samples) == row.integer(15);
         use(pose);
       },
       run);

@@ -22,6 +22,7 @@ struct StoredPose {
   PoseRecord record;
   std::string link;  ///< hexadecimal; empty: none
   bool suspect = false;
+  bool consistent = true;  ///< the columns that repeat what the samples say agree with them
 };
 
 /// Every pose of a run in the order of the visits.

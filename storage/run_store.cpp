@@ -272,6 +272,10 @@ Result<ChainReport> RunStore::check_chain(RunId run) const {
   return storage::check_chain(*impl_->database, run);
 }
 
+Result<std::vector<RunId>> RunStore::removed_runs() const {
+  return storage::removed_runs(*impl_->database);
+}
+
 Result<std::vector<PoseRecord>> RunStore::poses(RunId run) const {
   std::vector<PoseRecord> records;
   const auto done = each_pose(*impl_->database, run, [&](const StoredPose& pose) {

@@ -119,7 +119,8 @@ class RunStore {
   Result<void> commit_pose(RunId run, const PoseRecord& pose);
   Result<void> add_event(RunId run, const EventRecord& event);
   /// Takes a committed pose out of the run: it stays stored, but is neither loaded nor counted. Its
-  /// step may be measured again under another ordinal.
+  /// step may be measured again under another ordinal. An event "suspect" whose text holds `why`
+  /// comes before it: check_chain() asks for one.
   Result<void> suspect_pose(RunId run, long long ordinal, const std::string& why);
   /// Once per run.
   Result<void> set_identity(RunId run, const RigIdentity& identity);
@@ -138,6 +139,8 @@ class RunStore {
   Result<std::vector<EventRecord>> events(RunId run) const;
   /// Looks for changed, removed and inserted poses.
   Result<ChainReport> check_chain(RunId run) const;
+  /// Runs that were recorded and are not there any more.
+  Result<std::vector<RunId>> removed_runs() const;
   /// Ordinals of the committed poses that are not suspect, ascending.
   Result<std::vector<long long>> committed_poses(RunId run) const;
 

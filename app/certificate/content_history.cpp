@@ -91,7 +91,7 @@ void add_history(const Composer& c) {
   table.word_columns = {1, 2};
   for (const CertificateEvent& event : told.events) {
     // What a person wrote stays as it was written.
-    const bool own_words = event.kind == "operator";
+    const bool own_words = event.kind == "operator" || event.kind == "job";
     table.rows.push_back({significant(event.t_s, 5), c.tr.phrase(event.kind),
                           own_words ? event.text : c.tr.phrase(event.text)});
   }

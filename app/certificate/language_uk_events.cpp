@@ -9,6 +9,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     // clang-format off
     // --- kinds ---
     {"operator", "оператор"},
+    {"job", "завдання"},
     {"state", "стан"},
     {"identity", "обладнання"},
     {"retry", "повтор"},

@@ -44,9 +44,10 @@ std::string status_text(const Json& status) {
       status["done"].dump(), status["steps"].dump(), 100 * status["progress"].get<double>(),
       duration(status["remaining_s"]), head["delta_deg"].get<double>(), head["h_deg"].get<double>(),
       status["target"]["delta_deg"].get<double>(), status["target"]["h_deg"].get<double>(),
-      head["homed"].get<bool>() ? "" : ", not homed", attention["retries"].dump(),
-      attention["recoveries"].dump(), attention["suspensions"].dump(), attention["skipped"].dump(),
-      attention["left_out"].dump());
+      // The drive says so of a head at rest only.
+      head["homed"].get<bool>() || head["moving"].get<bool>() ? "" : ", not homed",
+      attention["retries"].dump(), attention["recoveries"].dump(), attention["suspensions"].dump(),
+      attention["skipped"].dump(), attention["left_out"].dump());
   for (const Json& event : status["events"]) {
     if (event["kind"] == "state") continue;
     text += fmt::format("  {} {}: {}\n", event["utc"].get<std::string>(),

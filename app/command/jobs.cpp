@@ -57,10 +57,19 @@ class Ledger {
   }
 
   bool is_done(const std::string& name) const {
-    for (const Json& job : jobs_) {
-      if (job.value("name", "") == name && job.value("done", false)) return true;
+    const Json* job = find(name);
+    return job != nullptr && job->value("done", false);
+  }
+
+  /// When the job was begun first, noted now if it never was: tells it from the one of that name
+  /// of another night.
+  Result<std::string> begin(const std::string& name) {
+    if (const Json* job = find(name)) return job->value("started_utc", "");
+    const std::string now = utc_now();
+    if (auto noted = put({{"name", name}, {"done", false}, {"started_utc", now}}); !noted) {
+      return fail(noted.error());
     }
-    return false;
+    return now;
   }
 
   Result<void> put(Json entry) {
@@ -80,6 +89,12 @@ class Ledger {
 
  private:
   explicit Ledger(fs::path file) : file_(std::move(file)) {}
+  const Json* find(const std::string& name) const {
+    for (const Json& job : jobs_) {
+      if (job.value("name", "") == name) return &job;
+    }
+    return nullptr;
+  }
   fs::path file_;
   Json jobs_ = Json::array();
 };
@@ -106,16 +121,27 @@ Result<ExitCode> verify_against(const fs::path& calibration, const MeasureReques
              : ExitCode::limits_exceeded;
 }
 
+ExitSummary how_it_ended(const Result<ExitCode>& code) {
+  return {.exit_code = code ? *code : exit_code_of(code.error().code),
+          .message = code ? "" : code.error().message,
+          .resume = {},
+          .chain_head = {}};
+}
+
 /// Measures when that has not been done, then whatever the job asks for.
 Result<ExitCode> perform_job(const Job& job, const JobQueue& queue, MeasureRequest& request) {
-  const auto go_on = resumable(job.rig, queue.database);
+  const auto go_on = resumable(job.rig, queue.database, request.session.job);
   if (!go_on) return fail(go_on.error());
   request.session.resume = *go_on;
   // A job that is resumed met its condition when it began.
   if (job.wait_for && !*go_on) {
     fmt::print(stderr, "job {}: waiting for {} within {} to {}\n", job.name, job.wait_for->column,
                job.wait_for->min, job.wait_for->max);
-    if (auto met = await_condition(job.rig.sensor, *job.wait_for); !met) return fail(met.error());
+    if (auto met = await_condition(job.rig.sensor, *job.wait_for, job.rig.recovery.wait_s); !met) {
+      const LiveState live(live_run(request));
+      Notifier(request.notify, live).end(how_it_ended(fail(met.error())));
+      return fail(met.error());
+    }
   }
   if (job.action == JobAction::calibrate) return measure_and_calibrate(request);
   LiveState live(live_run(request));
@@ -128,10 +154,7 @@ Result<ExitCode> perform_job(const Job& job, const JobQueue& queue, MeasureReque
     notifier.calibrating();
     code = verify_against(queue.out / job.against / "result.json", request, *run);
   }
-  notifier.end({.exit_code = code ? *code : exit_code_of(code.error().code),
-                .message = code ? "" : code.error().message,
-                .resume = {},
-                .chain_head = {}});
+  notifier.end(how_it_ended(code));
   return code;
 }
 
@@ -162,21 +185,24 @@ Result<ExitCode> run_jobs(const JobsArguments& arguments) {
       fmt::print("job {}: done before\n", job.name);
       continue;
     }
-    const std::string started_utc = utc_now();
-    MeasureRequest request{
-        .session = {.rig = job.rig, .database = queue->database, .out = queue->out},
-        .out = queue->out / job.name,
-        .notify = {.journal = queue->database.string() + ".log",
-                   .summary = {},
-                   .hook = queue->hook},
-        .resume_hint = "plumbline jobs " + arguments.queue};
+    const auto started_utc = ledger->begin(job.name);
+    if (!started_utc) return fail(started_utc.error());
+    MeasureRequest request{.session = {.rig = job.rig,
+                                       .database = queue->database,
+                                       .out = queue->out,
+                                       .job = fmt::format("{} {}", job.name, *started_utc)},
+                           .out = queue->out / job.name,
+                           .notify = {.journal = queue->database.string() + ".log",
+                                      .summary = {},
+                                      .hook = queue->hook},
+                           .resume_hint = "plumbline jobs " + arguments.queue};
     const auto code = perform_job(job, *queue, request);
     const ExitCode exit_code = code ? *code : exit_code_of(code.error().code);
     auto noted = ledger->put({{"name", job.name},
                               {"done", code.has_value()},
                               {"exit_code", static_cast<int>(exit_code)},
                               {"message", code ? Json() : Json(code.error().message)},
-                              {"started_utc", started_utc},
+                              {"started_utc", *started_utc},
                               {"ended_utc", utc_now()}});
     if (!noted) return fail(noted.error());
     fmt::print("job {}: {}\n", job.name, code ? "done" : code.error().message);

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <limits>
+#include <thread>
 
 #include "app/calibration_job.h"
 #include "app/provenance.h"
@@ -121,13 +122,17 @@ std::string chain_head_of(const std::filesystem::path& database, storage::RunId 
 
 bool stop_was_requested() { return control.stop_requested(); }
 
-Result<void> await_condition(const rig::SensorConfig& sensor, const WaitCondition& condition) {
+Result<void> await_condition(const rig::SensorConfig& sensor, const WaitCondition& condition,
+                             double patience_s) {
+  using Clock = std::chrono::steady_clock;
   constexpr std::chrono::milliseconds kTurn{100};
   const OrdersBySignal orders;
   auto source = rig::make_sample_source(sensor);
   if (!source) return fail(source.error());
   rig::Acquisition acquisition(*std::move(source));
-  if (auto started = acquisition.start(); !started) return started;
+  Result<void> listening = acquisition.start();
+  if (!listening) return listening;
+  Clock::time_point heard_at = Clock::now();
   constexpr double kNever = std::numeric_limits<double>::infinity();
   double begin_s = kNever;
   double inside_since_s = kNever;
@@ -139,8 +144,20 @@ Result<void> await_condition(const rig::SensorConfig& sensor, const WaitConditio
   };
   while (!control.stop_requested()) {
     tell_service_manager("waiting for " + condition.column);
+    if (!listening) {
+      if (Clock::now() - heard_at > std::chrono::duration<double>(patience_s)) return listening;
+      inside_since_s = kNever;  // what happened meanwhile nobody knows
+      std::this_thread::sleep_for(kTurn);
+      listening = acquisition.start();
+      continue;
+    }
     const auto batch = acquisition.take(kTurn);
-    if (!batch) return fail(batch.error());
+    if (!batch) {
+      listening = fail(batch.error());
+      continue;
+    }
+    if (batch->ended) return fail(ErrorCode::rig, "the recorded log of the sensor ended");
+    if (!batch->samples.empty()) heard_at = Clock::now();
     for (const RawSample& sample : batch->samples) {
       if (condition.column == "temp_C" && take(sample.t_s, sample.temp_C)) return {};
       if (sample.t_s - begin_s > condition.limit_s) {

@@ -26,8 +26,9 @@ struct MeasureRequest {
 /// Runs the plan alone and says which run it became. `live` and `notifier` are told about it.
 Result<storage::RunId> measure(const MeasureRequest& request, LiveState& live, Notifier& notifier);
 /// Listens to the sensor until the condition is met; fails (rig) when it is not within its limit,
-/// when the sensor falls silent, and when a signal asks to stop.
-Result<void> await_condition(const rig::SensorConfig& sensor, const WaitCondition& condition);
+/// when the sensor is silent or gone for `patience_s`, and when a signal asks to stop.
+Result<void> await_condition(const rig::SensorConfig& sensor, const WaitCondition& condition,
+                             double patience_s);
 /// True once a signal or the control socket has asked to stop.
 bool stop_was_requested();
 /// What stays the same during the session, for LiveState.

@@ -81,6 +81,12 @@ Result<ExitCode> verify_database(const VerifyArguments& arguments) {
     if (!report) return fail(report.error());
     sound = print_report(*report, arguments.head) && sound;
   }
+  const auto removed = store->removed_runs();
+  if (!removed) return fail(removed.error());
+  for (const storage::RunId run : *removed) {
+    fmt::print("run {}: was removed\n", run);
+    sound = false;
+  }
   return sound ? ExitCode::done : ExitCode::limits_exceeded;
 }
 

@@ -36,7 +36,8 @@ PlanOptions read_plan_options(StrictTable table) {
 SettlingOptions read_settling_options(StrictTable table) {
   SettlingOptions settling;
   settling.hold_s = table.number_or("hold_s", settling.hold_s, {0, 600});
-  settling.window = static_cast<int>(table.integer_or("window", settling.window, {8, 100000}));
+  settling.window =
+      static_cast<int>(table.integer_or("window", settling.window, {kSmallestWindow, 100000}));
   settling.sigma_factor = table.number_or("sigma_factor", settling.sigma_factor, {1, 1000});
   settling.cap_s = table.number_or("cap_s", settling.cap_s, {0.01, 3600});
   settling.noise_V = table.number_or("noise_V", settling.noise_V, {0, 1000});

@@ -168,6 +168,10 @@ Engine::Outcome<Engine::Settled> Engine::settle(const PlanStep& step) {
       const bool at_rest = held && detector.add(*sample);
       const bool capped = !at_rest && sample->t_s - arrival_s >= options_.settling.cap_s;
       if (!at_rest && !capped) continue;
+      // A converter that hangs since the last pose looks like rest, and may come back too soon for
+      // the samples alone to show it.
+      if (const auto why = implausible(detector.window(), options_.adc, floor_))
+        return repeat(*why);
       if (capped) {
         note("settle_cap", fmt::format("{}: not at rest after {} s; sampled all the same",
                                        step_text(step), options_.settling.cap_s));

@@ -259,6 +259,7 @@ Engine::Outcome<void> Engine::take_out(const std::vector<long long>& steps,
                                        const std::string& why) {
   for (const long long step : steps) {
     const long long ordinal = step + rounds_[step] * static_cast<long long>(progress_.steps);
+    note("suspect", fmt::format("pose {} is taken out and measured again: {}", step, why));
     if (auto done = store_.suspect_pose(run_, ordinal, why); !done) return give_up(done.error());
     ++rounds_[step];
     done_.erase(step);
@@ -266,7 +267,6 @@ Engine::Outcome<void> Engine::take_out(const std::vector<long long>& steps,
     progress_.done = done_.size();
     progress_.planned_done_s -= planned_s_.at(static_cast<std::size_t>(step));
     ++progress_.attention.suspects;
-    note("suspect", fmt::format("pose {} is taken out and measured again: {}", step, why));
   }
   return {};
 }

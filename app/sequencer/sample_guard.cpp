@@ -12,7 +12,7 @@ namespace {
 /// A constant code is a fault when one sample's noise exceeds this many steps: with 0.9 steps the
 /// most frequent code has a share of 42 %, and twelve in a row a probability of 3e−5.
 constexpr double kNoiseSteps = 0.9;
-constexpr std::size_t kConstantSamples = 12;
+constexpr std::size_t kConstantSamples = kSmallestWindow;
 constexpr double kStandardErrors = 6;
 constexpr double kSteps = 2;
 

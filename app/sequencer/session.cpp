@@ -26,6 +26,8 @@ struct Started {
 
 /// The event with which further poses begin.
 constexpr const char* kFurther = "separate";
+/// The one that says for which job of a queue a run was begun.
+constexpr const char* kJob = "job";
 
 storage::RunHeader header_of(const RigDescription& rig, const Plan& plan) {
   return {.serial = rig.run.dut.serial,
@@ -228,6 +230,10 @@ Result<Started> begin(storage::RunStore& store, const SessionRequest& request, c
     auto run = store.create_run(header_of(request.rig, plan));
     if (!run) return fail(run.error());
     started.run = *run;
+    if (!request.job.empty()) {
+      const auto noted = store.add_event(started.run, {0, utc_now(), kJob, request.job});
+      if (!noted) return fail(noted.error());
+    }
   }
   if (!request.operator_name.empty() && !started.nothing_is_left) {
     const auto noted = store.add_event(
@@ -329,7 +335,8 @@ Result<void> run_further(const SessionRequest& request, const Plan& plan, storag
 
 }  // namespace
 
-Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database) {
+Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database,
+                       const std::string& job) {
   if (!std::filesystem::exists(database)) return false;
   const auto store = storage::RunStore::open_read_only(database);
   if (!store) return fail(store.error());
@@ -340,9 +347,15 @@ Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& d
   for (const storage::RunSummary& run : *runs) {
     if (run.header.serial == rig.run.dut.serial) last = &run;
   }
-  return last != nullptr && last->state != storage::RunState::finished &&
-         last->header.plan_csv == to_csv(plan) &&
-         without_addresses(last->header.config_toml) == without_addresses(rig.source);
+  if (last == nullptr || last->header.plan_csv != to_csv(plan) ||
+      without_addresses(last->header.config_toml) != without_addresses(rig.source)) {
+    return false;
+  }
+  const auto events = store->events(last->id);
+  if (!events) return fail(events.error());
+  return std::any_of(events->begin(), events->end(), [&](const storage::EventRecord& event) {
+    return event.kind == kJob && event.text == job;
+  });
 }
 
 Result<Session> run_session(const SessionRequest& request, const EngineControl& control,

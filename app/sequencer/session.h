@@ -22,6 +22,7 @@ struct SessionRequest {
   std::filesystem::path out = {};
   bool resume = false;             ///< go on with the last unfinished run of rig.run.dut.serial
   std::string operator_name = {};  ///< who measures; noted as an event unless empty
+  std::string job = {};            ///< of a queue, and when it began; noted like the operator
   std::optional<Plan> plan = {};   ///< instead of the one that `rig` describes
   /// Asked once the plan is done: grid steps, numbered from 0, that the same run goes on with.
   std::function<Result<std::vector<PlanStep>>(storage::RunId)> further = {};
@@ -33,9 +34,11 @@ struct Session {
   Result<void> outcome;  ///< as of Engine::run()
 };
 
-/// Whether run_session() with `resume` would find a run to go on with: the unit's last run is
-/// unfinished and has this configuration and plan.
-Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database);
+/// Whether run_session() with `resume` would find a run to go on with: the unit's last run has this
+/// configuration and plan and was begun for this `job`. It may be finished: whoever asks knows that
+/// nothing has come of it yet.
+Result<bool> resumable(const RigDescription& rig, const std::filesystem::path& database,
+                       const std::string& job);
 
 /// Fails before anything moves when the plan, the room on the disk, the database, the run to be
 /// resumed or the sensor bus refuses; a failure is then the whole result. What goes wrong with

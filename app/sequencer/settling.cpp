@@ -8,7 +8,6 @@ namespace plumbline::app {
 
 namespace {
 
-constexpr int kSmallestWindow = 8;
 /// Median of |x| of a standard normal variable, inverted: turns a median into a standard deviation.
 constexpr double kMedianToSd = 1.4826;
 

@@ -11,12 +11,15 @@
 
 namespace plumbline::app {
 
+/// Fewer samples show neither rest nor a converter that hangs.
+inline constexpr int kSmallestWindow = 12;
+
 /// [settling] of rig.toml. A pose is accepted once the head has been in position for `hold_s` and,
 /// over a window of the latest samples, slope and scatter lie within what the noise leaves; or at
 /// the hard cap. All times are those of the sensor's clock.
 struct SettlingOptions {
   double hold_s = 0.1;        ///< "in position" without interruption, before anything is judged
-  int window = 20;            ///< samples judged together, at least 8
+  int window = 20;            ///< samples judged together, at least kSmallestWindow
   double sigma_factor = 4.0;  ///< how many standard errors slope and variance may lie off
   double cap_s = 10.0;        ///< accepted at the latest then, and recorded as capped
   /// Standard deviation of one sample at rest, for all axes; 0: learnt from the soak.
@@ -55,6 +58,8 @@ class SettlingDetector {
   /// Takes the next sample; a gap of the counter starts the window anew. True when the window is
   /// full and at rest.
   bool add(const RawSample& sample);
+  /// The samples that were judged last.
+  std::vector<RawSample> window() const { return {samples_.begin(), samples_.end()}; }
 
  private:
   SettlingOptions options_;

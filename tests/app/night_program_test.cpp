@@ -19,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
-using testing::Not;
 
 constexpr const char* kPlan = R"(
 [grid]
@@ -35,9 +34,10 @@ wait_s = 2
 
 class NightProgram : public testing::Test {
  protected:
-  void start_rig() {
+  void start_rig(const std::string& faults = "") {
     const fs::path world = fs::path(PLUMBLINE_SOURCE_DIR) / "rig/sim/worlds/white.toml";
-    auto simulated = SimulatedRig::start({.world_toml = text_of(world), .speed = 40, .seed = 3});
+    auto simulated =
+        SimulatedRig::start({.world_toml = text_of(world) + faults, .speed = 40, .seed = 3});
     ASSERT_TRUE(simulated.has_value()) << simulated.error().message;
     rig_ = std::make_unique<SimulatedRig>(*std::move(simulated));
     write_text(config(),
@@ -50,6 +50,7 @@ class NightProgram : public testing::Test {
                    rig_->can() + "\"\nidentity = \"IDENT.Serial\"\n" + kPlan);
   }
   std::string config() const { return folder_ / "rig.toml"; }
+  std::string hooks() const { return folder_ / "hooks"; }
   std::string database() const { return folder_ / "run.db"; }
   ProgramOutcome run(const std::vector<std::string>& more = {}) {
     std::vector<std::string> words = {"run",  "--config", config(), "--serial",     "A-1",
@@ -82,11 +83,10 @@ TEST_F(NightProgram, CtlPausesResumesShowsAndStops) {
   start_rig();
   EXPECT_EQ(ctl({"status"}).exit_code, 2) << "nobody is there";
   const std::string summary = folder_ / "exit.json";
-  const std::string hooks = folder_ / "hooks";
   ProgramOutcome ended;
   std::thread session([&] {
     ended = run({"--summary", summary, "--hook",
-                 "echo $PLUMBLINE_EVENT $PLUMBLINE_SERIAL $PLUMBLINE_EXIT_CODE >> " + hooks});
+                 "echo $PLUMBLINE_EVENT $PLUMBLINE_SERIAL $PLUMBLINE_EXIT_CODE >> " + hooks()});
   });
   ASSERT_TRUE(wait_until([](const json& now) { return now["done"] >= 2; }));
   EXPECT_EQ(ctl({"pause"}).exit_code, 0);
@@ -112,7 +112,7 @@ TEST_F(NightProgram, CtlPausesResumesShowsAndStops) {
   EXPECT_EQ(exit["state"], "stopped");
   EXPECT_THAT(exit["resume"], HasSubstr("plumbline run --resume"));
   EXPECT_EQ(exit["chain_head"].get<std::string>().size(), 64u);
-  EXPECT_EQ(text_of(hooks), "end A-1 3\n");
+  EXPECT_EQ(text_of(hooks()), "end A-1 3\n");
   EXPECT_THAT(text_of(database() + ".log"), HasSubstr("pause: asked to pause"));
   EXPECT_FALSE(fs::exists(database() + ".ctl"));
   EXPECT_THAT(run_plumbline({"verify", "--db", database()}).out, HasSubstr("unbroken"));
@@ -180,8 +180,62 @@ set = { plan = { soak_s = 0, verification_poses = 0 } }
   const ProgramOutcome second = run_plumbline({"jobs", queue});
   EXPECT_EQ(second.exit_code, 0) << second.err;
   EXPECT_THAT(second.out, HasSubstr("job check: done before"));
-  EXPECT_THAT(run_plumbline({"runs", "--db", folder_ / "night.db", "--json"}).out,
-              Not(HasSubstr("\"id\": 4")));
+  const auto runs = [this] {
+    return json::parse(run_plumbline({"runs", "--db", folder_ / "night.db", "--json"}).out);
+  };
+  EXPECT_EQ(runs()["runs"].size(), 3u);
+
+  // The power was cut after the last pose of the last job, before anything came of it.
+  json cut = ledger;
+  cut["jobs"][2]["done"] = false;
+  write_text(folder_ / "night/jobs.json", cut.dump());
+  fs::remove_all(folder_ / "night/check");
+  const ProgramOutcome third = run_plumbline({"jobs", queue});
+  EXPECT_EQ(third.exit_code, 0) << third.err;
+  EXPECT_TRUE(fs::exists(folder_ / "night/check/evaluation.json"));
+  EXPECT_EQ(runs()["runs"].size(), 3u) << "it was measured again";
+}
+
+TEST_F(NightProgram, WaitingForAConditionOutlastsASilentSensor) {
+  start_rig("\n[[faults]]\nkind = \"can.silence\"\nat_s = 60\nduration_s = 40\n");
+  const std::string queue = folder_ / "night.toml";
+  const auto with_wait = [&](const std::string& wait) {
+    write_text(queue, "hook = \"echo $PLUMBLINE_EVENT $PLUMBLINE_SERIAL $PLUMBLINE_EXIT_CODE >> " +
+                          hooks() + "\"" + R"(
+config = "rig.toml"
+database = "night.db"
+out = "night"
+[[job]]
+name = "soak"
+serial = "A-1"
+action = "record"
+set = { sensor = { silence_timeout_ms = 200 }, plan = { verification_poses = 0 }, grid = { delta_deg = { start = 0, stop = 0, step = 90 }, h_deg = { start = 0, stop = 0, step = 10 } } }
+)" + wait);
+    return run_plumbline({"jobs", queue});
+  };
+  const ProgramOutcome met =
+      with_wait("wait_for = { column = \"temp_C\", min = -50, max = 100, hold_s = 100 }\n");
+  EXPECT_EQ(met.exit_code, 0) << met.out << met.err;
+  EXPECT_EQ(text_of(hooks()), "end A-1 0\n");
+
+  // On another night it is not done: the run of before is not taken for this one's.
+  fs::remove_all(folder_ / "night");
+  std::this_thread::sleep_for(std::chrono::seconds(1));  // runs tell when they began in seconds
+  const ProgramOutcome never = with_wait(
+      "wait_for = { column = \"temp_C\", min = 200, max = 300, hold_s = 1, limit_s = 20 }\n");
+  EXPECT_EQ(never.exit_code, 3) << never.out;
+  EXPECT_THAT(never.err, HasSubstr("temp_C was not within 200 to 300"));
+  EXPECT_EQ(text_of(hooks()), "end A-1 0\nend A-1 3\n") << "nobody was told";
+}
+
+TEST_F(NightProgram, TheJournalRotates) {
+  start_rig();
+  const std::string journal = database() + ".log";
+  write_text(journal, std::string(1'999'999, 'x') + "\n");
+  EXPECT_EQ(run().exit_code, 0);
+  EXPECT_EQ(fs::file_size(folder_ / "run.db.1.log"), 2'000'000u);
+  EXPECT_LT(fs::file_size(journal), 100'000u);
+  EXPECT_THAT(text_of(journal), HasSubstr("state: finished"));
 }
 
 TEST_F(NightProgram, AQueueThatMakesNoSenseIsRefused) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -164,6 +165,26 @@ TEST_F(SequencerRecovery, AConverterThatHangsAndOneThatIsOverdrivenAreNotBelieve
   EXPECT_THAT(events("retry"), Contains(HasSubstr("end of the converter's span")));
   const storage::StoredRun run = stored();
   for (const double u : run.grid.samples.u_V[0]) EXPECT_LT(u, -0.01);
+}
+
+TEST_F(SequencerRecovery, AConverterThatComesBackAmongTheSamplesIsNotBelieved) {
+  // It hangs on every way, and comes back here before, there while the samples are taken.
+  rig_.recovery.attempts_per_pose = 12;
+  std::string faults;
+  for (int move = 1; move < 24; ++move) {
+    faults += fault("can.stuck_code", fmt::format("axis = \"x\"\nmove = {}\nduration_s = {}", move,
+                                                  3.0 + 0.15 * (move % 12)));
+  }
+  start_rig(faults);
+  expect_finished(run());
+  EXPECT_THAT(events("retry"), Contains(HasSubstr("the converter hangs")));
+  const storage::StoredRun run = stored();
+  for (const Pose& pose : run.grid.poses) {
+    const auto first = run.grid.samples.u_V[0].begin() + static_cast<std::ptrdiff_t>(pose.first);
+    const auto [low, high] =
+        std::minmax_element(first, first + static_cast<std::ptrdiff_t>(pose.count));
+    EXPECT_LT(*high - *low, 0.01) << "pose " << pose.number;
+  }
 }
 
 TEST_F(SequencerRecovery, APoseThatCannotBeReachedIsPutOffAndThenMeasured) {

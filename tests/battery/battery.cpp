@@ -54,7 +54,7 @@ std::string ShortPlan::text() const {
   const double delta_step_deg = 360.0 / deltas;
   return fmt::format(
       "\n[plan]\nsoak_s = 5\nsamples_per_pose = {}\nverification_poses = 0\n"
-      "[settling]\nwindow = 10\n{}"
+      "[settling]\nwindow = 12\n{}"
       "[grid]\ndelta_deg = {{ start = 0, stop = {}, step = {} }}\n"
       "h_deg = {{ start = 0, stop = {}, step = {} }}\n"
       // On a machine without time for the drive's answers, a pose fails for no fault of the run's.

@@ -87,6 +87,10 @@ int shim(long from, long step, long most, int jobs, double speed, const std::str
       ended = program.wait();
     }
     if (ended.code == 0 || ended.code == 1) return false;  // fewer steps: all have been met
+    if (ended.err.find("free some space") == std::string::npos) {
+      complaints.add(fmt::format("step {}", n),
+                     "the message does not say what to do: " + ended.err);
+    }
     check(bench, folder, database, ended, fmt::format("step {}", n), complaints);
     for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(database.string() + suffix);
     return true;

@@ -33,6 +33,7 @@ std::string fault(const std::string& kind, const std::string& rest) {
 }
 
 struct Case {
+  std::string kind;  ///< what is counted together
   std::string name;
   std::string world;
   bool may_fail = false;   ///< ending the run safely is right, too
@@ -45,8 +46,9 @@ struct Counts {
   int runs = 0;
   int finished = 0;
   int ended_safely = 0;
-  int noticed = 0;                  ///< runs with a retry or a fault among their events
-  std::map<std::string, int> when;  ///< states of the engine in which the first of them came
+  int noticed = 0;                   ///< runs with a retry or a fault among their events
+  std::map<std::string, int> when;   ///< states of the engine in which the first of them came
+  std::map<std::string, int> kinds;  ///< runs with each kind of fault
   int poses = 0;
   int wrong = 0;
 
@@ -56,10 +58,19 @@ struct Counts {
     ended_safely += more.ended_safely;
     noticed += more.noticed;
     for (const auto& [state, times] : more.when) when[state] += times;
+    for (const auto& [kind, times] : more.kinds) kinds[kind] += times;
     poses += more.poses;
     wrong += more.wrong;
   }
 };
+
+std::string listed(const std::map<std::string, int>& counts) {
+  std::string text;
+  for (const auto& [name, times] : counts) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : "; ", name, times);
+  }
+  return text;
+}
 
 /// The state in which the first fault was noticed; empty when none was.
 std::string state_at_fault(const std::vector<storage::EventRecord>& events) {
@@ -106,6 +117,7 @@ void run_case(const Case& one, double speed, bool rtu, std::uint64_t seed, const
   const double took_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   ++counts.runs;
+  ++counts.kinds[one.kind];
   if (took_s > 120 * patience()) complain(fmt::format("took {:.0f} s", took_s));
   if ((ended.code == 0 || ended.code == 1) && !one.must_fail) {
     ++counts.finished;
@@ -177,6 +189,7 @@ Case modbus_case(int index, std::mt19937_64& random) {
       fmt::format("move = {}\ndelay_s = {:.2f}", integer(0, 12), real(3.4, 4.5)),  // sampling
       fmt::format("after = {}", integer(0, 300))}[phase];                          // resuming
   Case one;
+  one.kind = kind.name;
   one.name =
       fmt::format("{} {} {} {}", kind.name, rest,
                   std::array{"idle", "homing", "moving", "sampling", "resuming"}[phase], when);
@@ -190,6 +203,7 @@ Case modbus_case(int index, std::mt19937_64& random) {
 /// Another drive, or one that was set up anew between two sessions.
 Case swapped_words(bool resuming) {
   Case one;
+  one.kind = "word order";
   one.name = resuming ? "word order swapped before resuming" : "word order swapped";
   one.world = "\n[drive]\nword_order = \"low_first\"\n";
   one.must_fail = true;  // positions make no sense
@@ -207,7 +221,8 @@ Case drive_case(int index, std::mt19937_64& random) {
   const std::string kind = kKinds[which];
   const std::string code = which == 4 ? "code = 0x84\n" : "";  // the watchdog's
   Case one;
-  one.name = fmt::format("{} {} move {} delay {:.2f}", kind, axis, move, delay_s);
+  one.kind = which == 4 ? "drive.alarm of the watchdog" : kind;
+  one.name = fmt::format("{} {} move {} delay {:.2f}", one.kind, axis, move, delay_s);
   one.world = fault(kind, fmt::format("{}axis = \"{}\"\nmove = {}\ndelay_s = {:.3f}{}", code, axis,
                                       move, delay_s, kind == "drive.slip" ? "\nslip_deg = 8" : ""));
   if (kind == "drive.slip") {
@@ -229,30 +244,36 @@ Case can_case(int index, std::mt19937_64& random) {
   Case one;
   switch (index % 8) {
     case 0:
+      one.kind = "can.loss";
       one.name = fmt::format("loss of {:.2f} %", 100 * share);
       one.world = fault("can.loss", fmt::format("probability = {:.5f}", share));
       one.may_fail = share > 0.03;  // 20 consecutive samples are then rare
       break;
     case 1:
+      one.kind = "can.reorder";
       one.name = fmt::format("reordering of {:.2f} %", 100 * share);
       one.world = fault("can.reorder", fmt::format("probability = {:.5f}", share));
       one.may_fail = share > 0.03;
       break;
     case 2:
+      one.kind = "can.duplicate";
       one.name = fmt::format("duplicates of {:.2f} %", 100 * share);
       one.world = fault("can.duplicate", fmt::format("probability = {:.5f}", share));
       break;
     case 3:
+      one.kind = "bus-off";
       one.name = fmt::format("bus-off at move {}", move);
       one.world = fault("can.error_frame", "error_class = 0x40\n" + trigger) +
                   fault("can.silence", trigger + fmt::format("duration_s = {}", 40 * patience()));
       break;
     case 4:
+      one.kind = "can.stuck_code";
       one.name = fmt::format("{} stuck at move {}", axis, move);
       one.world =
           fault("can.stuck_code", trigger + fmt::format("axis = \"{}\"\nduration_s = 6", axis));
       break;
     case 5:
+      one.kind = "can.saturation";
       one.name = fmt::format("{} saturated at move {}", axis, move);
       one.world =
           fault("can.saturation", trigger + fmt::format("axis = \"{}\"\nduration_s = 3", axis));
@@ -260,6 +281,7 @@ Case can_case(int index, std::mt19937_64& random) {
     case 6: {
       const int after = std::uniform_int_distribution<int>(0, 60)(random);
       const char* by_s = index / 8 % 2 == 0 ? "3600" : "-3600";
+      one.kind = "time of day";
       one.name = fmt::format("time of day set by {} s after {} looks at it", by_s, after);
       one.environment = {{"LD_PRELOAD", shim_path()},
                          {"PLUMBLINE_CLOCK_STEP", by_s},
@@ -268,6 +290,7 @@ Case can_case(int index, std::mt19937_64& random) {
       break;
     }
     default:
+      one.kind = "can.silence";
       one.name = fmt::format("silence at move {}", move);
       one.world = fault("can.silence", trigger + fmt::format("duration_s = {}", 60 * patience()));
   }
@@ -287,6 +310,7 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   std::string place = "/tmp";
   int jobs = 1;
+  std::string only;
   CLI::App* modbus = app.add_subcommand("modbus");
   CLI::App* drive = app.add_subcommand("drive");
   CLI::App* can = app.add_subcommand("can");
@@ -296,6 +320,7 @@ int main(int argc, char** argv) {
     sub->add_option("--speed", speed);
     sub->add_option("--seed", seed);
     sub->add_option("--in", place, "where the databases are");
+    sub->add_option("--only", only, "of these the runs with one kind of fault");
     sub->add_option("--jobs", jobs, "so many runs beside each other")->check(CLI::Range(1, 64));
   }
   CLI11_PARSE(app, argc, argv);
@@ -308,6 +333,9 @@ int main(int argc, char** argv) {
                                                       : modbus_case(i - i / 15, random))
                     : drive->parsed() ? drive_case(i, random)
                                       : can_case(i, random));
+  }
+  if (!only.empty()) {
+    std::erase_if(cases, [&](const Case& one) { return one.kind != only; });
   }
   std::mutex mutex;
   std::size_t next = 0;
@@ -323,14 +351,11 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
     }
   });
-  std::string when;
-  for (const auto& [state, runs] : counts.when) {
-    when += fmt::format("{}{} {}", when.empty() ? "" : "; ", state, runs);
-  }
+  fmt::print("battery-wire: runs with {}\n", listed(counts.kinds));
   fmt::print(
       "battery-wire {}: {} runs, {} finished, {} ended safely, {} had to recover ({}); {} poses "
       "accepted, {} of them wrong, {} faults\n",
       app.get_subcommands().front()->get_name(), counts.runs, counts.finished, counts.ended_safely,
-      counts.noticed, when, counts.poses, counts.wrong, complaints.count());
+      counts.noticed, listed(counts.when), counts.poses, counts.wrong, complaints.count());
   return complaints.exit_code();
 }

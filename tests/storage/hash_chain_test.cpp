@@ -1,6 +1,7 @@
 // The hash chain finds whatever was done to the database behind the program's back.
 #include "storage/hash_chain.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "storage/schema.h"
@@ -72,6 +73,8 @@ TEST_F(HashChainTest, FindsEveryChange) {
       "UPDATE pose SET approach = 1",
       "UPDATE pose SET samples = zeroblob(37 * sample_count)",
       "UPDATE pose SET ordinal = 99",
+      "UPDATE pose SET first_t_s = first_t_s - 1",
+      "UPDATE pose SET last_t_s = last_t_s + 1",
       "UPDATE covariate SET value = 41",
       "UPDATE covariate SET name = 'x'",
       "DELETE FROM covariate",
@@ -112,6 +115,24 @@ TEST_F(HashChainTest, FindsInsertionsAndAChangedDescription) {
   tamper("UPDATE run SET serial = 'B' WHERE id = 2");
   EXPECT_THAT(report(2).faults, ElementsAre(HasSubstr("pose 0 (grid): was changed, or the "
                                                       "description")));
+}
+
+TEST_F(HashChainTest, FindsAPoseThatWasTakenOutInSilence) {
+  // No trigger refuses an insertion.
+  tamper("INSERT INTO suspect VALUES (3, 'it was not to my liking')");
+  EXPECT_THAT(report(1).faults, ElementsAre(HasSubstr("pose 1: was taken out of the run")));
+  EXPECT_THAT(report(2).faults, IsEmpty());
+}
+
+TEST_F(HashChainTest, FindsRunsThatWereRemoved) {
+  const auto removed = [this] { return RunStore::open_read_only(file_).value().removed_runs(); };
+  EXPECT_THAT(removed().value(), IsEmpty());
+  const std::string parts[] = {"covariate WHERE pose IN (SELECT id FROM pose WHERE run = ",
+                               "link WHERE run = (", "pose WHERE run = (", "run WHERE id = ("};
+  for (const int run : {1, 2}) {  // in the middle, and at the end
+    for (const std::string& part : parts) tamper(fmt::format("DELETE FROM {}{})", part, run));
+  }
+  EXPECT_THAT(removed().value(), ElementsAre(1, 2));
 }
 
 TEST_F(HashChainTest, RunsOfAnOlderDatabaseGetTheirChain) {

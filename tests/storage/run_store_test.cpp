@@ -225,6 +225,10 @@ TEST_F(RunStoreTest, ASuspectPoseStaysStoredButOutOfTheRun) {
   RunStore store = open();
   const RunId run = store.create_run(example_header()).value();
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(store.commit_pose(run, example_pose(i)));
+  ASSERT_TRUE(store.add_event(run, {.t_s = 30,
+                                    .utc = "2026-01-01T00:00:00Z",
+                                    .kind = "suspect",
+                                    .text = "pose 1 is taken out: the head had slipped"}));
   ASSERT_TRUE(store.suspect_pose(run, 1, "the head had slipped"));
   EXPECT_THAT(store.committed_poses(run).value(), ElementsAre(0, 2));
   EXPECT_EQ(store.runs().value().front().poses, 2);
