@@ -59,9 +59,8 @@ std::vector<Alternative> proven_rivals(const SearchInput& input, const Candidate
     if (candidate.axis != found.axis || candidate.effect == found.effect ||
         !candidate.effect->certain(input.log))
       continue;
-    EnlargedParameters model = base;
-    model.effects.push_back(candidate.active());
-    EnlargedFit fit = fit_from_levels(input.log, result.observed, result.whitening, model);
+    EnlargedFit fit = fit_from_levels(input.log, result.observed, result.whitening,
+                                      with_effect(base, candidate.active()));
     if (fit.determined) rivals.push_back({candidate.effect->id(), std::move(fit)});
   }
   return rivals;

@@ -101,6 +101,11 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
   return a_g;
 }
 
+EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active) {
+  model.effects.push_back(active);
+  return model;
+}
+
 TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
                      const std::vector<Eigen::Vector3d>& a_g, std::size_t visit) {
   const double K_ii = twelve(static_cast<Eigen::Index>(axis));

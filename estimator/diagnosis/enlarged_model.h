@@ -42,6 +42,9 @@ std::vector<HeadGeometry> head_geometries(const VisitLog& log,
 std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
                                                const EnlargedParameters& parameters);
 
+/// The model with one more effect.
+EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active);
+
 /// What a term of an axis may depend on at one visit, `twelve` being the axis's parameters and
 /// `a_g` the specific forces of all visits, which must live as long.
 TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,

@@ -2,7 +2,6 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -10,18 +9,13 @@
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
-#include "estimator/linear_algebra.h"
+#include "estimator/diagnosis/slow_look.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
 
 namespace {
-
-EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active) {
-  model.effects.push_back(active);
-  return model;
-}
 
 /// Whether two models have the same effects on an axis, whatever their sizes.
 bool same_on_axis(const EnlargedParameters& a, const EnlargedParameters& b, std::size_t axis) {
@@ -222,109 +216,31 @@ class Search {
   }
 
   /// A slow effect that the noise was estimated without is partly taken for slow noise, and then
-  /// hides in it. So the noise is estimated once more, beside all that is slow, and the candidates
-  /// are compared by the likelihood of each with its own noise: where that is clearly better beside
-  /// few functions of time, and where there is noise to hide in, beside any course of time.
+  /// hides in it. Looked for where the noise is clearly smaller beside few functions of time, and
+  /// where there is noise to hide in, beside any course of time.
   bool add_slow_one() {
     constexpr double kWorthALook = 1e-3;
-    const auto better = [](std::size_t, double p_of_all) { return p_of_all < kWorthALook; };
-    if (add_slow_one(slow_functions(input_.log), better)) return true;
+    if (add_slow_one(slow_functions(input_.log), {true, true, true}, kWorthALook)) return true;
     PerAxis<bool> slow_noise{};
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) slow_noise[axis] = has_slow_noise(axis);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      slow_noise[axis] = has_slow_noise(input_, stage_, axis);
     if (slow_noise == PerAxis<bool>{}) return false;
     // So many functions are seldom better as a whole, even if one of them is the truth.
-    const auto room = [&](std::size_t axis, double) { return slow_noise[axis]; };
-    return add_slow_one(any_course_of_time(input_.log), room);
+    return add_slow_one(any_course_of_time(input_.log), slow_noise, 1);
   }
 
-  /// Whether there is slow noise in which an effect could hide.
-  bool has_slow_noise(std::size_t axis) const {
-    constexpr double kOfFast = 0.3;  // variances
-    const auto& unit = input_.processes.unit;
-    const Eigen::VectorXd& power = stage_.noise[axis].power;
-    double fast_V2 = stage_.own_V2[axis].mean(), slow_V2 = 0;
-    for (std::size_t i = 0; i < unit.size(); ++i) {
-      const double over_the_run = unit[i].diagonal().mean() - unit[i].mean();
-      (i < kTermB ? fast_V2 : slow_V2) += power(static_cast<Eigen::Index>(i)) * over_the_run;
-    }
-    return slow_V2 > kOfFast * fast_V2;
-  }
-
-  /// `beside`: what is slow, n × any number; worth_a_look(axis, p-value of all of it together).
-  template <typename WorthALook>
-  bool add_slow_one(const Eigen::MatrixXd& beside, const WorthALook& worth_a_look) {
-    constexpr std::size_t kRefined = 4;
-    const EnlargedParameters& model = stage_.fit.parameters;
-    const Stage rich = settle_noise(input_, model, {{}, &stage_.noise, nullptr}, beside);
-    Before before{{}, &stage_.noise, &rich};
-    // The noise that was handed in may have been estimated beside more than the model.
-    for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
-      if (!rich.coarse[axis]) before.known[axis] = &stage_.noise[axis];
-    const PerAxis<PooledNoise> plain = settle_noise(input_, model, before).noise;
-    PerAxis<bool> looked_at{};
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const double gain = plain[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
-      looked_at[i] = worth_a_look(
-          i, chi_squared_tail(std::max(0.0, gain), static_cast<double>(beside.cols())));
-    }
-    if (looked_at == PerAxis<bool>{}) return false;
-    const EnlargedFit rich_fit = fit_enlarged(input_.log, rich.observed, rich.whitening, model);
-    const CandidateResponses beside_slow =
-        candidate_responses(input_.log, list_, rich.whitening, rich_fit.parameters);
-    const CandidateGains gains(beside_slow, rich_fit);
-    std::vector<Scored> ranked = screen(list_, gains, gains.of(rich_fit.whitened_residual).col(0));
-    const Eigen::MatrixXd slow = orthonormal_basis(beside);
-    std::erase_if(ranked, [&](const Scored& s) {
-      const Candidate& c = list_.candidates[s.candidate];
-      return c.effect->subject() == Subject::head || !looked_at[c.axis] ||
-             std::count(dropped_.begin(), dropped_.end(), c.family) > 0 || is_chosen(c) ||
-             !is_within(c, slow);
-    });
-    std::vector<Stage> stages(std::min(kRefined, ranked.size()));
-    parallel_for(stages.size(), [&](std::size_t k) {
-      const Candidate& candidate = list_.candidates[ranked[k].candidate];
-      Before compared{all_of(plain), &rich.noise, &rich};
-      compared.known[candidate.axis] = nullptr;
-      stages[k] = settle(input_, with_effect(model, candidate.active()), compared);
-    });
-    const Scored* winner = nullptr;
-    EnlargedParameters with_winner;
-    double winner_score = std::numeric_limits<double>::infinity(), winner_log_p = 0;
-    for (std::size_t k = 0; k < stages.size(); ++k) {
-      const Candidate& candidate = list_.candidates[ranked[k].candidate];
-      const Stage& with = stages[k];
-      if (!with.fit.determined) continue;
-      const double gain = plain[candidate.axis].likelihood_deviance -
-                          with.noise[candidate.axis].likelihood_deviance;
-      const double log_p = log_chi_squared_tail(gain, gains.dof(ranked[k].candidate));
-      const double score = log_p + (ranked[k].score - ranked[k].log_p);
-      if (score < winner_score) {
-        winner = &ranked[k];
-        with_winner = with.fit.parameters;
-        winner_score = score;
-        winner_log_p = log_p;
-      }
-    }
-    if (winner == nullptr) return false;
-    // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
-    const std::size_t looks =
-        ranked.size() * list_.family_size[list_.candidates[winner->candidate].family];
-    const double p = p_of_search(winner_log_p, static_cast<double>(looks));
+  bool add_slow_one(const Eigen::MatrixXd& beside, const PerAxis<bool>& axes, double worth_a_look) {
+    const auto is_open = [&](const Candidate& c) {
+      return std::count(dropped_.begin(), dropped_.end(), c.family) == 0 && !is_chosen(c);
+    };
+    const auto found = look_among_slow(input_, list_, stage_, noise_is_own_,
+                                       {beside, axes, worth_a_look, is_open});
+    if (!found) return false;
+    const double p = p_of_search(found->log_p, found->looks);
     p_best_rest_ = std::min(p_best_rest_, p);
-    if (p > options_.false_alarm_of_slow || !adopt(with_winner)) return false;
-    choose(winner->candidate, p);
+    if (p > options_.false_alarm_of_slow || !adopt(found->model)) return false;
+    choose(found->candidate, p);
     return true;
-  }
-
-  /// Whether most of what a candidate does to its axis lies in the span of the slow functions.
-  bool is_within(const Candidate& candidate, const Eigen::MatrixXd& basis) const {
-    constexpr double kMost = 0.7;  // of the sum of squares
-    const EnlargedParameters& model = stage_.fit.parameters;
-    Eigen::VectorXd change =
-        predict_means_V(input_.log, with_effect(model, candidate.active()))[candidate.axis] -
-        predict_means_V(input_.log, model)[candidate.axis];
-    change.array() -= change.mean();
-    return (basis.transpose() * change).squaredNorm() > kMost * change.squaredNorm();
   }
 
   /// A term that holds one of the model's effects as a special case cannot stand beside it: it

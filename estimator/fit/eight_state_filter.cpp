@@ -8,14 +8,7 @@
 namespace plumbline {
 namespace {
 
-// A first-order Gauss-Markov process has its largest Allan deviation, 0.6174·σ_stationary, at
-// τ = 1.89 correlation times (IEEE Std 952, annex C); flicker noise has the plateau B·√(2 ln2/π).
-// Equal heights there make the process stand in for flicker over about a decade of τ.
-constexpr double kGaussMarkovPeak = 0.6174;
-
 double squared(double value) { return value * value; }
-
-double coefficient(const NoiseTerm& term) { return term.present ? term.value : 0.0; }
 
 // The arithmetic of a step and of an update, on columns of the covariance in halves of four: the
 // compiler maps them to whatever vectors there are. Each of the two functions exists once for any
@@ -180,21 +173,28 @@ const Kernel kKernel{carry_plain, correct_plain};
 
 }  // namespace
 
+double flicker_variance_V2(const NoiseModel& noise) {
+  // A first-order Gauss-Markov process has its largest Allan deviation, 0.6174·σ_stationary, at
+  // τ = 1.89 correlation times (IEEE Std 952, annex C); flicker noise has the plateau B·√(2 ln2/π).
+  constexpr double kGaussMarkovPeak = 0.6174;
+  const double plateau_V =
+      noise.B.coefficient() * std::sqrt(2.0 * std::numbers::ln2 / std::numbers::pi);
+  return squared(plateau_V / kGaussMarkovPeak);
+}
+
 EightStateFilter::EightStateFilter(const NoiseModel& noise, const EightStateOptions& options,
                                    double start_s)
     : flicker_rate_per_s_(1.0 / options.flicker_correlation_s),
-      walk_density_(squared(coefficient(noise.K))),
+      walk_density_(squared(noise.K.coefficient())),
       walk_decay_per_s_(noise.walk_decay_per_s),
       ramp_frequency_(options.ramp_frequency_rad_s),
       parameter_density_(options.parameter_walk.cwiseAbs2()),
       as_printed_(options.as_printed),
       t_s_(start_s) {
   assert(options.flicker_correlation_s > 0 && options.ramp_frequency_rad_s > 0);
-  const double plateau_V =
-      coefficient(noise.B) * std::sqrt(2.0 * std::numbers::ln2 / std::numbers::pi);
-  const double flicker_variance = squared(plateau_V / kGaussMarkovPeak);
+  const double flicker_variance = flicker_variance_V2(noise);
   flicker_density_ = 2.0 * flicker_rate_per_s_ * flicker_variance;
-  const double slope_V_per_s = coefficient(noise.R);
+  const double slope_V_per_s = noise.R.coefficient();
   ramp_density_ = squared(slope_V_per_s) * ramp_frequency_;
 
   x_.setZero();

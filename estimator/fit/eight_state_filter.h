@@ -51,6 +51,10 @@ struct Innovation {
   double nis() const { return value_V * value_V / variance_V2; }
 };
 
+/// Variance, V², of the first-order Gauss-Markov process that stands in for flicker noise: equal
+/// heights of the Allan plateau, which holds for about a decade of τ (IEEE Std 952, annex C).
+double flicker_variance_V2(const NoiseModel& noise);
+
 /// Linear in all eight states. Time steps may be uneven; each is discretised exactly: the three
 /// noise processes and the parameters do not act on each other, so the matrix exponential is block
 /// diagonal and Van Loan's integral is taken for each block. Lengths of steps count to 1 ns, and

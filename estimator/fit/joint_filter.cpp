@@ -2,9 +2,9 @@
 
 #include <cassert>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
+#include "estimator/fit/eight_state_filter.h"
 #include "estimator/noise/square.h"
 
 namespace plumbline {
@@ -16,8 +16,6 @@ constexpr Index kAxes = static_cast<Index>(kAxisCount);
 constexpr Index kDrifts =
     2 * kAxes;  ///< flicker and random walk of each axis, after the parameters
 
-double coefficient(const NoiseTerm& term) { return term.present ? term.value : 0.0; }
-
 /// What an axis's drifts do between visits.
 struct Drift {
   double flicker_variance = 0;
@@ -27,12 +25,8 @@ struct Drift {
 };
 
 Drift drift_of(const NoiseModel& noise, const JointFilterOptions& options) {
-  // Equal heights of the Allan plateau, as in EightStateFilter.
-  constexpr double kGaussMarkovPeak = 0.6174;
-  const double plateau_V =
-      coefficient(noise.B) * std::sqrt(2 * std::numbers::ln2 / std::numbers::pi);
-  return {square(plateau_V / kGaussMarkovPeak), 1 / options.flicker_correlation_s,
-          square(coefficient(noise.K)), noise.walk_decay_per_s};
+  return {flicker_variance_V2(noise), 1 / options.flicker_correlation_s,
+          square(noise.K.coefficient()), noise.walk_decay_per_s};
 }
 
 /// One pass: the parameters counted from where the readings are linearised, so that they keep their

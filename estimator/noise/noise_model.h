@@ -27,6 +27,8 @@ struct NoiseTerm {
   double u = 0;
   bool present = false;    ///< distinguishable from zero on this record
   double upper_limit = 0;  ///< 95 % upper limit, meaningful when absent
+
+  double coefficient() const { return present ? value : 0.0; }
 };
 
 /// A sine in the record, or a narrow-band disturbance that wanders about one frequency.

@@ -1,0 +1,40 @@
+// Slow effects, which hide in slow noise that was estimated without them.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+
+#include "estimator/diagnosis/noise_stage.h"
+#include "estimator/diagnosis/search.h"
+
+namespace plumbline {
+
+/// Where a look among the slow candidates goes.
+struct SlowLook {
+  const Eigen::MatrixXd& beside;  ///< what is slow, n × any number of functions of the visits
+  PerAxis<bool> axes;
+  /// An axis is looked at when all of `beside` together has a smaller p-value; 1: always.
+  double worth_a_look;
+  std::function<bool(const Candidate&)> is_open;  ///< whether a candidate may join the model
+};
+
+/// The candidate that a look found, and what speaks for it.
+struct SlowFinding {
+  std::size_t candidate = 0;
+  EnlargedParameters model;  ///< with it, fitted
+  double log_p = 0;          ///< of its own
+  double looks = 1;          ///< that were taken
+};
+
+/// The noise is estimated once more, beside all that is slow, and the candidates are compared by
+/// the likelihood of each with its own noise. `noise_is_own`: the noise of `stage` was estimated
+/// beside its model and nothing else. Empty when nothing was worth a look or is determined.
+std::optional<SlowFinding> look_among_slow(const SearchInput& input, const CandidateList& list,
+                                           const Stage& stage, bool noise_is_own,
+                                           const SlowLook& look);
+
+/// Whether there is slow noise in which an effect could hide.
+bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis);
+
+}  // namespace plumbline
