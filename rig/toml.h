@@ -1,10 +1,7 @@
-// toml++ with two traps taken away that a file from outside would run into:
-// - its assertions: a control character where a key should begin ends the program, one line before
-// the
-//   library would have refused it properly;
-// - "unreachable" in its tables of Unicode whitespace, which letters like й (U+00A1 … U+049A)
-// outside a
-//   string do reach: undefined behaviour where the answer is no (3.3, in Debian 12).
+// toml++ with two traps taken away that a file from outside would run into. Its assertions: a
+// control character where a key should begin ends the program, one line before the library would
+// have refused it properly. "Unreachable" in its tables of Unicode whitespace (3.3, in Debian 12):
+// letters like й (U+00A1 … U+049A) outside a string reach it, which is undefined behaviour.
 #pragma once
 
 #define TOML_ASSERT(condition) static_assert(true)

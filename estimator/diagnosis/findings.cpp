@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 
 #include "estimator/diagnosis/alternatives.h"
 #include "estimator/diagnosis/detection_limits.h"
@@ -12,6 +13,24 @@
 
 namespace plumbline {
 namespace {
+
+/// An instant lies somewhere between the last sample before it and the first one after, or in a
+/// part of a dwell.
+void place(const VisitLog& log, EffectParameter& instant) {
+  const auto after = std::find_if(log.visits.begin(), log.visits.end(), [&](const Visit& visit) {
+    return visit.t_arrival_s >= instant.value;
+  });
+  if (after == log.visits.begin()) return;
+  const Visit& before = *std::prev(after);
+  const auto count = static_cast<double>(before.count);
+  if (after == log.visits.end() || after->t_arrival_s > instant.value) {
+    instant.u = before.step_s * count / (effect::kPartsOfDwell * std::sqrt(12.0));
+    return;
+  }
+  const double end_s = before.t_arrival_s + before.step_s * (count - 1);
+  instant.value = 0.5 * (end_s + after->t_arrival_s);
+  instant.u = (after->t_arrival_s - end_s) / std::sqrt(12.0);
+}
 
 std::vector<EffectParameter> report_parameters(const VisitLog& log,
                                                const EnlargedEstimate& estimate,
@@ -38,21 +57,7 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
       parameter.u = active.effect->choice_uncertainty(log, active.axis, k);
     }
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
-    if (infos[k].role == ParameterRole::index && infos[k].unit == "s") {
-      // The instant lies somewhere between the last sample before and the first one after, or in a
-      // part of a dwell.
-      for (std::size_t v = 1; v < log.visits.size(); ++v) {
-        if (log.visits[v].t_arrival_s < active.p[k])
-          parameter.u = log.visits[v].step_s * static_cast<double>(log.visits[v].count) /
-                        (effect::kPartsOfDwell * std::sqrt(12.0));
-        if (log.visits[v].t_arrival_s != active.p[k]) continue;
-        const Visit& before = log.visits[v - 1];
-        const double end_s =
-            before.t_arrival_s + before.step_s * (static_cast<double>(before.count) - 1);
-        parameter.value = 0.5 * (end_s + active.p[k]);
-        parameter.u = (active.p[k] - end_s) / std::sqrt(12.0);
-      }
-    }
+    if (infos[k].role == ParameterRole::index && infos[k].unit == "s") place(log, parameter);
     reported.push_back(std::move(parameter));
   }
   return reported;

@@ -44,8 +44,7 @@ double log_choices(double n, double k) {
   return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
 }
 
-}  // namespace
-
+/// The codes as if the converter had never had these bits, ascending like the bits.
 std::vector<std::int64_t> without_bits(const std::vector<std::int64_t>& codes,
                                        const std::vector<StuckBit>& bits) {
   std::vector<std::int64_t> left = codes;
@@ -55,6 +54,8 @@ std::vector<std::int64_t> without_bits(const std::vector<std::int64_t>& codes,
       code = (code >> (bit->bit + 1) << bit->bit) | (code & ((std::int64_t{1} << bit->bit) - 1));
   return left;
 }
+
+}  // namespace
 
 std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc,
                               const std::vector<StuckBit>& stuck) {
@@ -155,8 +156,8 @@ CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& a
   CodeFaults faults{stuck_bits(codes, adc),
                     coarser_lattice(codes, adc, dwells_over_codes(set, axis, adc))};
   if (faults.stuck_bits.empty() || !faults.coarser_lattice) return faults;
-  constexpr double kWithoutBits =
-      1e-3;  // that something is wrong is certain; what, is the question
+  // That something is wrong is certain; what it is, is the question.
+  constexpr double kWithoutBits = 1e-3;
   if (coarser_lattice(without_bits(codes, faults.stuck_bits), adc,
                       dwells_over_codes(set, axis, adc, faults.stuck_bits), kWithoutBits))
     faults.stuck_bits.clear();

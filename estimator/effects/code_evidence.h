@@ -34,10 +34,6 @@ struct Lattice {
   std::vector<double> second_rounding_V = {};
 };
 
-/// The codes with these bits left out, as if the converter had never had them: ascending.
-std::vector<std::int64_t> without_bits(const std::vector<std::int64_t>& codes,
-                                       const std::vector<StuckBit>& bits);
-
 /// In how many dwells of `set` the readings of an axis step over a code of `adc`, bits that are
 /// stuck left out: most readings share few codes, and none lies between two of them. Noise of a
 /// sound converter does not do that.

@@ -51,6 +51,24 @@ class NightProgram : public testing::Test {
   }
   std::string config() const { return folder_ / "rig.toml"; }
   std::string hooks() const { return folder_ / "hooks"; }
+  std::string hook() const {
+    return "echo $PLUMBLINE_EVENT $PLUMBLINE_SERIAL $PLUMBLINE_EXIT_CODE >> " + hooks();
+  }
+  /// A queue that begins by recording one position.
+  static std::string soak_first(const std::string& more_settings = "") {
+    return R"(
+config = "rig.toml"
+database = "night.db"
+out = "night"
+[[job]]
+name = "soak"
+serial = "A-1"
+action = "record"
+set = { )" +
+           more_settings +
+           R"(plan = { verification_poses = 0 }, grid = { delta_deg = { start = 0, stop = 0, step = 90 }, h_deg = { start = 0, stop = 0, step = 10 } } }
+)";
+  }
   std::string database() const { return folder_ / "run.db"; }
   ProgramOutcome run(const std::vector<std::string>& more = {}) {
     std::vector<std::string> words = {"run",  "--config", config(), "--serial",     "A-1",
@@ -84,10 +102,7 @@ TEST_F(NightProgram, CtlPausesResumesShowsAndStops) {
   EXPECT_EQ(ctl({"status"}).exit_code, 2) << "nobody is there";
   const std::string summary = folder_ / "exit.json";
   ProgramOutcome ended;
-  std::thread session([&] {
-    ended = run({"--summary", summary, "--hook",
-                 "echo $PLUMBLINE_EVENT $PLUMBLINE_SERIAL $PLUMBLINE_EXIT_CODE >> " + hooks()});
-  });
+  std::thread session([&] { ended = run({"--summary", summary, "--hook", hook()}); });
   ASSERT_TRUE(wait_until([](const json& now) { return now["done"] >= 2; }));
   EXPECT_EQ(ctl({"pause"}).exit_code, 0);
   ASSERT_TRUE(wait_until([](const json& now) { return now["state"] == "paused"; }));
@@ -145,16 +160,9 @@ TEST_F(NightProgram, DoctorSaysWhatToDo) {
 TEST_F(NightProgram, AQueueIsDoneOnceAndGoesOnWhereItWas) {
   start_rig();
   const std::string queue = folder_ / "night.toml";
-  write_text(queue, R"(
-config = "rig.toml"
-database = "night.db"
-out = "night"
-[[job]]
-name = "soak"
-serial = "A-1"
-action = "record"
-set = { plan = { verification_poses = 0 }, grid = { delta_deg = { start = 0, stop = 0, step = 90 }, h_deg = { start = 0, stop = 0, step = 10 } } }
-wait_for = { column = "temp_C", min = -50, max = 100, hold_s = 2, limit_s = 60 }
+  write_text(queue,
+             soak_first() +
+                 R"(wait_for = { column = "temp_C", min = -50, max = 100, hold_s = 2, limit_s = 60 }
 [[job]]
 name = "unit"
 serial = "A-1"
@@ -200,17 +208,8 @@ TEST_F(NightProgram, WaitingForAConditionOutlastsASilentSensor) {
   start_rig("\n[[faults]]\nkind = \"can.silence\"\nat_s = 60\nduration_s = 40\n");
   const std::string queue = folder_ / "night.toml";
   const auto with_wait = [&](const std::string& wait) {
-    write_text(queue, "hook = \"echo $PLUMBLINE_EVENT $PLUMBLINE_SERIAL $PLUMBLINE_EXIT_CODE >> " +
-                          hooks() + "\"" + R"(
-config = "rig.toml"
-database = "night.db"
-out = "night"
-[[job]]
-name = "soak"
-serial = "A-1"
-action = "record"
-set = { sensor = { silence_timeout_ms = 200 }, plan = { verification_poses = 0 }, grid = { delta_deg = { start = 0, stop = 0, step = 90 }, h_deg = { start = 0, stop = 0, step = 10 } } }
-)" + wait);
+    write_text(queue, "hook = \"" + hook() + "\"" +
+                          soak_first("sensor = { silence_timeout_ms = 200 }, ") + wait);
     return run_plumbline({"jobs", queue});
   };
   const ProgramOutcome met =

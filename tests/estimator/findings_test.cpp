@@ -94,7 +94,7 @@ TEST(Findings, WhatHappenedOnceIsNoSlowNoise) {
 }
 
 TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
-  // Pose 20 of 60 comes at 121 s and has 20 samples, 3/8 of them before the step.
+  // Pose 20 of 60 comes at 121 s and has 20 samples, 8 of them before the step.
   SyntheticOptions options;
   options.more_x_V = [](double, double t_s) { return t_s < 121.0749 ? 0 : 2e-3; };
   const Calibration result = calibrated(synthetic_run(6, kSixteenBits, options));
@@ -108,7 +108,6 @@ TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
 }
 
 TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
-  const SyntheticRun before = synthetic_run(7, kSixteenBits);
   SyntheticOptions options;
   options.more_x_V = [](double, double t_s) {
     return (t_s < 120 ? 0 : 2e-3) + (t_s < 180 ? 0 : 3e-3);

@@ -40,29 +40,31 @@ TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
   EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
 }
 
-// Near the boundary slow noise decides on which side of the step a pose is: no pose is wrong there.
-TEST(DiagnosisStudy, ACodeStepInSlowNoiseIsNamedAndNoPoseIsBlamed) {
-  const SetOutcome outcome = run_set({.seed = 73002,
-                                      .effects = {"adc.code_step"},
-                                      .size = 10,
-                                      .order = sim::RecordOrder::snake,
-                                      .noise = NoiseKind::coloured,
-                                      .bits = 12});
+SetDesign coarse_in_slow_noise(std::uint64_t seed, const char* effect, sim::RecordOrder order) {
+  return {.seed = seed,
+          .effects = {effect},
+          .size = 10,
+          .order = order,
+          .noise = NoiseKind::coloured,
+          .bits = 12};
+}
+
+void expect_only_finding(const SetOutcome& outcome) {
   ASSERT_TRUE(outcome.feasible);
   EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
+// Near the boundary slow noise decides on which side of the step a pose is: no pose is wrong there.
+TEST(DiagnosisStudy, ACodeStepInSlowNoiseIsNamedAndNoPoseIsBlamed) {
+  expect_only_finding(
+      run_set(coarse_in_slow_noise(73002, "adc.code_step", sim::RecordOrder::snake)));
+}
+
 TEST(DiagnosisStudy, AStuckBitOfACoarseConverterIsTheOnlyFinding) {
-  const SetOutcome outcome = run_set({.seed = 74003,
-                                      .effects = {"adc.stuck_bit"},
-                                      .size = 10,
-                                      .order = sim::RecordOrder::random,
-                                      .noise = NoiseKind::coloured,
-                                      .bits = 12});
-  ASSERT_TRUE(outcome.feasible);
-  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  const SetOutcome outcome =
+      run_set(coarse_in_slow_noise(74003, "adc.stuck_bit", sim::RecordOrder::random));
+  expect_only_finding(outcome);
   EXPECT_LT(outcome.after.fresh, 1.5 * outcome.oracle.fresh);
 }
 
