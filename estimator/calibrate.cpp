@@ -157,6 +157,16 @@ bool rounded_as_declared(const CalibrationInput& input, std::size_t axis) {
   return faults.stuck_bits.empty() && !faults.coarser_lattice;
 }
 
+/// What the covariance lacks since the powers of the noise are estimates, too.
+Eigen::Matrix4d allowance_for_noise(const Experiment& experiment, const AxisWork& work) {
+  if (work.test.present.empty()) return Eigen::Matrix4d::Zero();
+  const Eigen::Matrix4d& C = work.fit.estimate.covariance;
+  return 2 * C *
+         allowance_for_powers(experiment.processes, work.test.present, work.test.information,
+                              work.V, experiment.A, C) *
+         C;
+}
+
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
   AxisWork work;
   const Eigen::VectorXd mean_V = mean_voltages(experiment.poses, axis);
@@ -208,7 +218,9 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
     work.noise_known = known;
+    const Eigen::Matrix4d allowance = allowance_for_noise(experiment, work);
     use_codes(experiment, axis, work);
+    work.fit.estimate.covariance += allowance;
     return work;
   }
   // Nothing is known about the noise: the residual has to say how large it is.

@@ -235,7 +235,7 @@ bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& star
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
     for (std::size_t k = 0; k < infos.size(); ++k)
-      if (active.free[k] && infos[k].role == ParameterRole::shape &&
+      if (active.free[k] && infos[k].role == ParameterRole::shape && !infos[k].place &&
           !(active.p[k] * start.effects[e].p[k] > 0))
         return false;
   }

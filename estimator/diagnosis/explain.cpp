@@ -6,6 +6,7 @@
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/heldout.h"
+#include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/separation.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
@@ -195,6 +196,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   if (found.evidence.size() != before_dropping)
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
   if (found.evidence.empty()) return without_effects();
+  const Eigen::MatrixXd under_this_noise = found.fit.covariance;
+  found.fit.covariance += allowance_for_noise(search, found);
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);
@@ -232,7 +235,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     const auto block = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     const Eigen::MatrixXd lower = found.whitening.lower[i].triangularView<Eigen::Lower>();
     const double expected_V2 = (lower.rowwise().squaredNorm().sum() -
-                                (block * found.fit.covariance).cwiseProduct(block).sum()) /
+                                (block * under_this_noise).cwiseProduct(block).sum()) /
                                static_cast<double>(n);
     const double floor_mps2 = std::abs(factor) * std::sqrt(std::max(expected_V2, 0.0));
     if (result.floor_pose_rms_mps2[i] > 0) {

@@ -81,6 +81,16 @@ bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
 
 }  // namespace
 
+namespace {
+
+/// What the static record says of the noise of an axis: nothing where rounding matters.
+NoiseModel record_of(const SearchInput& input, std::size_t axis, bool coarse) {
+  return coarse || input.log.codes[axis].coarser_lattice ? without_record(input.noise[axis])
+                                                         : input.noise[axis];
+}
+
+}  // namespace
+
 PerAxis<const PooledNoise*> all_of(const PerAxis<PooledNoise>& noise) {
   return {&noise[0], &noise[1], &noise[2]};
 }
@@ -119,9 +129,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       columns.leftCols(jacobian.cols()) = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
       if (beside.cols() > 0) columns.rightCols(beside.cols()) = beside;
       const Eigen::MatrixXd design = independent_columns(columns);
-      const NoiseModel record = free.coarse || input.log.codes[i].coarser_lattice
-                                    ? without_record(input.noise[i])
-                                    : input.noise[i];
+      const NoiseModel record = record_of(input, i, free.coarse);
       const auto pool = [&](const Eigen::VectorXd& own_V2) {
         return NoisePool(input.processes, record, own_V2)
             .pool(mean_V - predicted[i], design,
@@ -158,6 +166,27 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters, con
   Stage stage = settle_noise(input, parameters, before);
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
+}
+
+Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found) {
+  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, found.fit.parameters);
+  const Eigen::MatrixXd& C = found.fit.covariance;
+  const auto n = std::ssize(input.log.visits);
+  PerAxis<Eigen::MatrixXd> of_axis;
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    const Eigen::MatrixXd X = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
+    const Eigen::MatrixXd lower = found.whitening.lower[i].triangularView<Eigen::Lower>();
+    const Eigen::MatrixXd V = lower * lower.transpose();
+    const Eigen::VectorXd& power = found.noise[i].power;
+    std::vector<Eigen::Index> present;
+    for (Eigen::Index k = 0; k < power.size(); ++k)
+      if (power(k) > 0) present.push_back(k);
+    const NoisePool pool(input.processes, record_of(input, i, found.coarse[i]), found.own_V2[i]);
+    const Eigen::MatrixXd information =
+        pool.information_of(power, make_projector(V, independent_columns(X)).P, present);
+    of_axis[i] = allowance_for_powers(input.processes, present, information, V, X, C);
+  });
+  return 2 * C * (of_axis[0] + of_axis[1] + of_axis[2]) * C;
 }
 
 namespace {

@@ -58,6 +58,7 @@ class Search {
       const bool found = add_one();
       if (!found && !(worth_slow_look && add_slow_one())) break;
       drop_superfluous();
+      tell_in_one();
       if (!found) worth_slow_look = chosen_.size() > before;
     }
     while (exchange_one()) drop_superfluous();
@@ -335,6 +336,55 @@ class Search {
     }
   }
 
+  /// What happened again and again on an axis may be one thing that repeats.
+  void tell_in_one() {
+    constexpr std::size_t kOften = 3;
+    for (std::size_t k = 0; k < chosen_.size(); ++k) {
+      const Candidate& first = list_.candidates[chosen_[k]];
+      std::vector<std::size_t> instances;
+      std::vector<std::vector<double>> p;
+      for (std::size_t l = k; l < chosen_.size(); ++l) {
+        const Candidate& other = list_.candidates[chosen_[l]];
+        if (other.effect != first.effect || other.axis != first.axis) continue;
+        instances.push_back(l);
+        p.push_back(stage_.fit.parameters.effects[l].p);
+      }
+      if (instances.size() >= kOften && replace_in_one(instances, p)) return;
+    }
+  }
+
+  bool replace_in_one(const std::vector<std::size_t>& instances,
+                      const std::vector<std::vector<double>>& p) {
+    const Candidate& repeated = list_.candidates[chosen_[instances.front()]];
+    const EnlargedFit without = fit_without(instances);
+    double spent = 0;
+    for (const std::size_t k : instances) spent += price(chosen_[k], dof_of(k));
+    const Effect* tried = nullptr;
+    std::optional<Exchange> best;
+    double best_chi2 = stage_.fit.chi2 + spent;
+    for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
+      const Candidate& candidate = list_.candidates[c];
+      if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
+      tried = candidate.effect;
+      for (const Hypothesis& hypothesis : tried->in_one(repeated.effect->id(), p)) {
+        const ActiveEffect active = activate(*tried, candidate.axis, hypothesis);
+        const EnlargedFit with = fit_with(without.parameters, active);
+        const auto dof = static_cast<int>(std::count(active.free.begin(), active.free.end(), true));
+        const double cost = with.chi2 + price(c, dof);
+        if (!with.determined || cost >= best_chi2) continue;
+        const double p_value = p_of_search(
+            log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks_);
+        if (p_value > options_.false_alarm) continue;
+        best_chi2 = cost;
+        best = {c, p_value, with.parameters};
+      }
+    }
+    if (!best || !adopt(best->parameters)) return false;
+    for (auto k = instances.rbegin(); k != instances.rend(); ++k) forget(*k);
+    choose(best->candidate, best->p);
+    return true;
+  }
+
   int dof_of(std::size_t k) const {
     const auto& free = stage_.fit.parameters.effects[k].free;
     return static_cast<int>(std::count(free.begin(), free.end(), true));
@@ -423,6 +473,7 @@ class Search {
     result.fit = std::move(stage_.fit);
     result.observed = std::move(stage_.observed);
     result.own_V2 = std::move(stage_.own_V2);
+    result.coarse = stage_.coarse;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       if (stage_.crossing_V2[axis].size() > 0) result.own_V2[axis] += stage_.crossing_V2[axis];
     result.noise = std::move(stage_.noise);

@@ -47,6 +47,7 @@ struct SearchResult {
   std::vector<Evidence> evidence;
   Observations observed;            ///< freed of rounding as the final model sees it
   PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
+  PerAxis<bool> coarse{};           ///< rounding matters
   PerAxis<PooledNoise> noise;       ///< re-estimated under the final model
   PoseWhitening whitening;
   CandidateResponses responses;  ///< of the candidates beside the final model

@@ -44,6 +44,59 @@ double log_choices(double n, double k) {
   return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
 }
 
+/// How many readings jump away from the others of their dwell by this bit, and would lie next to
+/// them, on its other side, if the bit were what it is not.
+std::size_t readings_that_jump(const MeasurementSet& set, std::size_t axis, const Adc& adc,
+                               const StuckBit& stuck) {
+  const std::int64_t size = std::int64_t{1} << stuck.bit;
+  const std::int64_t sign = stuck.value ? -1 : 1;
+  std::size_t jumps = 0;
+  for (const Pose& pose : set.poses) {
+    const auto first = set.samples.u_V[axis].begin() + static_cast<std::ptrdiff_t>(pose.first);
+    std::int64_t low = std::numeric_limits<std::int64_t>::max(), high = 0;
+    std::vector<std::int64_t> codes;
+    for (auto u = first; u != first + static_cast<std::ptrdiff_t>(pose.count); ++u) {
+      codes.push_back(sign * std::llround((*u - adc.min_V) / adc.lsb_V()));
+      low = std::min(low, codes.back());
+      high = codes.size() == 1 ? codes.back() : std::max(high, codes.back());
+    }
+    if (high - low < 3 * size / 4) continue;
+    // Those far below belong next to the others, above or below.
+    std::int64_t least_moved = low + size, most_moved = low + size, least_kept = high;
+    std::size_t moved = 0;
+    for (const std::int64_t code : codes) {
+      if (2 * code < low + high) {
+        ++moved;
+        most_moved = std::max(most_moved, code + size);
+      } else {
+        least_kept = std::min(least_kept, code);
+      }
+    }
+    const bool apart = least_moved > high || most_moved < least_kept;
+    const std::int64_t spread = std::max(high, most_moved) - std::min(least_kept, least_moved);
+    if (apart && spread <= size / 4) jumps += moved;
+  }
+  return jumps;
+}
+
+/// Bits that never change and that readings of one dwell jump by.
+std::vector<StuckBit> jumping_bits(const MeasurementSet& set, std::size_t axis,
+                                   const std::vector<std::int64_t>& codes, const Adc& adc) {
+  constexpr int kLowest = 3;          // below it noise makes such jumps
+  constexpr std::size_t kEnough = 2;  // readings: a single one may be a spike
+  std::vector<StuckBit> found;
+  for (int bit = kLowest; bit < adc.bits; ++bit) {
+    const std::int64_t mask = std::int64_t{1} << bit;
+    const auto is_set = [mask](std::int64_t code) { return (code & mask) != 0; };
+    const StuckBit stuck{bit, !codes.empty() && is_set(codes.front())};
+    if (std::any_of(codes.begin(), codes.end(),
+                    [&](std::int64_t code) { return is_set(code) != stuck.value; }))
+      continue;
+    if (readings_that_jump(set, axis, adc, stuck) >= kEnough) found.push_back(stuck);
+  }
+  return found;
+}
+
 /// The codes as if the converter had never had these bits, ascending like the bits.
 std::vector<std::int64_t> without_bits(const std::vector<std::int64_t>& codes,
                                        const std::vector<StuckBit>& bits) {
@@ -155,6 +208,12 @@ CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& a
   const std::vector<std::int64_t> codes = codes_seen(set.samples.u_V[axis], adc);
   CodeFaults faults{stuck_bits(codes, adc),
                     coarser_lattice(codes, adc, dwells_over_codes(set, axis, adc))};
+  for (const StuckBit& bit : jumping_bits(set, axis, codes, adc))
+    if (std::none_of(faults.stuck_bits.begin(), faults.stuck_bits.end(),
+                     [&](const StuckBit& known) { return known.bit == bit.bit; }))
+      faults.stuck_bits.push_back(bit);
+  std::sort(faults.stuck_bits.begin(), faults.stuck_bits.end(),
+            [](const StuckBit& a, const StuckBit& b) { return a.bit < b.bit; });
   if (faults.stuck_bits.empty() || !faults.coarser_lattice) return faults;
   // That something is wrong is certain; what it is, is the question.
   constexpr double kWithoutBits = 1e-3;

@@ -112,6 +112,12 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   return drivers;
 }
 
+Driver load(const VisitLog& log) {
+  Driver driver{"previous_pose", "", {}};
+  for (std::size_t i = 0; i < kAxisCount; ++i) driver.value[i] = specific_force_component_g(log, i);
+  return driver;
+}
+
 std::vector<Driver> remembered_drivers(const VisitLog& log) {
   std::vector<Driver> drivers;
   PerAxis<std::vector<double>> a_g;

@@ -1,6 +1,7 @@
 // The variables that may drive a residual, at every visit of a log.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,12 +17,19 @@ struct Driver {
   bool angle = false;                  ///< periodic in 2π
   bool recorded = false;               ///< a column of the measurement file
   bool in_the_twelve = false;          ///< a bias proportional to it is what K and U₀ describe
+  /// The output of this axis. On the axis itself the model's output stands for it: readings that
+  /// explain themselves prove nothing.
+  std::optional<std::size_t> output_of = {};
   bool varies() const;
 };
 
 /// Time, angles, the specific force, what came before, and every recorded column with its rate of
 /// change.
 std::vector<Driver> instantaneous_drivers(const VisitLog& log);
+
+/// The specific force of the own axis, under the name of what came before: for what follows it with
+/// a play.
+Driver load(const VisitLog& log);
 
 /// What recorded columns and the specific force of the own axis were on average lately, weighted by
 /// exp(−age/τ), for the time constants of kMemory_s.

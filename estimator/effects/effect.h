@@ -27,7 +27,8 @@ struct ParameterInfo {
   std::string name;  ///< as in result.json
   std::string unit;
   ParameterRole role = ParameterRole::amplitude;
-  double step = 0;  ///< over which the response is differentiated; 0: fitted to role and value
+  double step = 0;     ///< over which the response is differentiated; 0: fitted to role and value
+  bool place = false;  ///< shape: a place, which may be zero or negative, and not a size
 };
 
 /// Where the search begins: shapes and indices at given values, amplitudes at a small typical size
@@ -68,6 +69,12 @@ class Effect {
   /// Hypotheses close to `hypothesis`, too many to search among all the others; the one that the
   /// search chose is compared with these.
   virtual std::vector<Hypothesis> closer(const VisitLog&, const Hypothesis&) const { return {}; }
+  /// Hypotheses that say in one what several `instances` of the effect `repeated` on the same axis
+  /// say one by one; none where they have nothing in common.
+  virtual std::vector<Hypothesis> in_one(const std::string& /*repeated*/,
+                                         const std::vector<std::vector<double>>& /*p*/) const {
+    return {};
+  }
   /// Head: moves the geometry of visit `visit`.
   virtual void displace(const VisitLog& log, std::size_t visit, const double* p,
                         HeadGeometry& head) const;

@@ -1,6 +1,7 @@
 #include "estimator/noise/reml.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -258,6 +259,38 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
     }
   }
   return 0.5 * information;
+}
+
+Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
+                                     const std::vector<Eigen::Index>& present,
+                                     const Eigen::MatrixXd& information, const Eigen::MatrixXd& V,
+                                     const Eigen::MatrixXd& X, const Eigen::MatrixXd& C) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(V);
+  const Eigen::MatrixXd B = factor.solve(X);
+  const auto count = std::ssize(present);
+  std::vector<Eigen::MatrixXd> P, Z;  // −∂(X'V⁻¹X) by each power; L⁻¹ times what it does to B
+  for (const Eigen::Index i : present) {
+    const Eigen::MatrixXd moved = processes.unit[static_cast<std::size_t>(i)] * B;
+    P.emplace_back(B.transpose() * moved);
+    Z.emplace_back(factor.matrixL().solve(moved));
+  }
+  // In units of the powers' own uncertainties; what is not determined at all is left out.
+  constexpr double kDetermined = 1e-6;
+  const Eigen::VectorXd scale = information.diagonal().unaryExpr(
+      [](double value) { return value > 0 ? 1 / std::sqrt(value) : 0; });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information *
+                                                             scale.asDiagonal());
+  Eigen::VectorXd inverse = eigen.eigenvalues();
+  for (double& value : inverse) value = value > kDetermined ? 1 / value : 0;
+  const Eigen::MatrixXd W = scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
+                            eigen.eigenvectors().transpose() * scale.asDiagonal();
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (Eigen::Index j = 0; j < count; ++j) {
+      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+      M += W(i, j) * (Z[a].transpose() * Z[b] - P[a] * C * P[b]);
+    }
+  return M;
 }
 
 Eigen::VectorXd NoisePool::starting_powers() const {

@@ -82,6 +82,15 @@ NoiseModel without_record(NoiseModel model);
 NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
                            const PooledNoise& pooled, double span_s);
 
+/// What the covariance C (p×p) of generalised least-squares estimates of the design X (n×p) lacks
+/// since the powers of the noise, of which those of the processes `present` have this information,
+/// were themselves estimated: the allowance is 2·C·M·C, and M is returned (Kenward & Roger,
+/// Biometrics 53, 1997, eq. 5). Several records of independent noise add their M.
+Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
+                                     const std::vector<Eigen::Index>& present,
+                                     const Eigen::MatrixXd& information, const Eigen::MatrixXd& V,
+                                     const Eigen::MatrixXd& X, const Eigen::MatrixXd& C);
+
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.
 struct Projector {

@@ -130,7 +130,7 @@ MeasurementSet poses_with(std::int64_t (*fault)(std::int64_t code)) {
   std::normal_distribution<double> noise(0, 0.25);
   MeasurementSet set;
   for (int k = 0; k < 300; ++k) {
-    set.poses.push_back({k, 0, 0, set.samples.size(), 40});
+    set.poses.push_back({k, 0, 0, set.samples.u_V[0].size(), 40});
     const double steps = 1950 + 33 * std::sin(0.37 * k);
     for (int i = 0; i < 40; ++i)
       for (auto& u_V : set.samples.u_V)
@@ -167,6 +167,27 @@ TEST(CodeFaults, TheLowestBitAloneIsAlsoAStepOfTwiceTheSize) {
   EXPECT_DOUBLE_EQ(faults.coarser_lattice->step_V, 2 * kTwelveBits.lsb_V());
 }
 
+TEST(CodeFaults, AHighBitThatFewReadingsCrossIsNamed) {
+  // The readings reach seven codes below where bit 6 changes.
+  for (const bool value : {false, true}) {
+    const CodeFaults faults =
+        value ? code_faults(poses_with([](std::int64_t code) { return (code + 60) | 64; }), 0,
+                            kTwelveBits)
+              : code_faults(
+                    poses_with([](std::int64_t code) { return (code - 4) & ~std::int64_t{64}; }), 0,
+                    kTwelveBits);
+    ASSERT_EQ(faults.stuck_bits.size(), 1U);
+    EXPECT_EQ(faults.stuck_bits.front().bit, 6);
+    EXPECT_EQ(faults.stuck_bits.front().value, value);
+  }
+}
+
+TEST(CodeFaults, SpikesOfTheSizeOfABitAreNoStuckBit) {
+  MeasurementSet set = poses_with([](std::int64_t code) { return code; });
+  for (const std::size_t k : {100, 5000, 9000}) set.samples.u_V[0][k] -= 70 * kTwelveBits.lsb_V();
+  EXPECT_TRUE(code_faults(set, 0, kTwelveBits).stuck_bits.empty());
+}
+
 TEST(CodeFaults, ASoundConverterHasNone) {
   const CodeFaults faults =
       code_faults(poses_with([](std::int64_t code) { return code; }), 0, kTwelveBits);
@@ -180,7 +201,7 @@ MeasurementSet dwells(std::uint64_t seed, double amplitude_V, double f_hz, doubl
   std::normal_distribution<double> noise_V(0, 3e-4);
   MeasurementSet set;
   for (int k = 0; k < 200; ++k) {
-    set.poses.push_back({k, 0, 0, set.samples.size(), 40});
+    set.poses.push_back({k, 0, 0, set.samples.u_V[0].size(), 40});
     for (int m = 0; m < 40; ++m) {
       const double t_s = 6.4 * k + 0.01 * m;
       set.samples.t_s.push_back(t_s);

@@ -251,5 +251,48 @@ TEST(ResidualTest, FindsAQuadraticAndAWrongPose) {
             1e-6);
 }
 
+TEST(AllowanceForPowers, OnePowerScalesEverythingAndMovesNothing) {
+  const SmallRun run = make_run(1, 0);
+  const NoiseProcesses processes = noise_processes(run.windows);
+  const Eigen::MatrixXd V = 1e-8 * processes.unit[kTermK] + 1e-8 * processes.unit[kTermN];
+  NoiseProcesses one = processes;
+  one.unit[kTermN] = V;
+  const Eigen::MatrixXd C =
+      (run.design.transpose() * V.llt().solve(run.design)).llt().solve(Eigen::Matrix4d::Identity());
+  const Eigen::MatrixXd M =
+      allowance_for_powers(one, {kTermN}, Eigen::MatrixXd::Constant(1, 1, 50), V, run.design, C);
+  EXPECT_LT((C * M * C).norm(), 1e-9 * C.norm());
+}
+
+// K_z hangs on what changes slowly, and a few slow noise values say little of their own variance.
+TEST(AllowanceForPowers, EstimatesScatterAsWidelyAsItSays) {
+  constexpr int kRuns = 80;
+  double plain = 0, allowed = 0;
+  for (std::uint64_t seed = 0; seed < kRuns; ++seed) {
+    const SmallRun run = make_run(seed, 0);
+    const NoiseProcesses processes = noise_processes(run.windows);
+    const NoisePool pool(processes, run.noise, Eigen::VectorXd());
+    const PooledNoise noise = pool.pool(run.mean, run.design);
+    const Eigen::LLT<Eigen::MatrixXd> factor(noise.covariance);
+    const Eigen::Matrix4d C = (run.design.transpose() * factor.solve(run.design))
+                                  .llt()
+                                  .solve(Eigen::Matrix4d::Identity());
+    const Eigen::Vector4d x = C * (run.design.transpose() * factor.solve(run.mean));
+    std::vector<Eigen::Index> present;
+    for (Eigen::Index i = 0; i < noise.power.size(); ++i)
+      if (noise.power(i) > 0) present.push_back(i);
+    const Eigen::MatrixXd information =
+        pool.information_of(noise.power, make_projector(noise.covariance, run.design).P, present);
+    const Eigen::Matrix4d allowance =
+        2 * C *
+        allowance_for_powers(processes, present, information, noise.covariance, run.design, C) * C;
+    EXPECT_GE(allowance.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9 * C.norm());
+    plain += x(2) * x(2) / C(2, 2) / kRuns;
+    allowed += x(2) * x(2) / (C(2, 2) + allowance(2, 2)) / kRuns;
+  }
+  EXPECT_GT(plain, allowed);
+  EXPECT_NEAR(allowed, 1, 0.35) << "without: " << plain;
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -4,8 +4,7 @@
 // formats give it, reported for axes that the effect acts on. Some effects go by two names, and
 // then either is right:
 //  - what follows the past of a column may be told as the column, as its rate or as both: a lag is
-//  a
-//    function of the column's history, which carries the column's name;
+//    a function of the column's history, which carries the column's name;
 //  - what follows the output of an axis may be told as code_i or as a_i: but for some per cent of
 //    misalignment they are one variable;
 //  - a spindle that turns to and fro has a total turn that is a function of its angle.

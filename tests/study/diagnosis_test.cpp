@@ -40,6 +40,25 @@ TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
   EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
 }
 
+// Shapes that a low polynomial or harmonic series does not have: what is left of them must not go
+// by listed names.
+TEST(DiagnosisStudy, EffectsWithSharpShapesHaveTheirDriverAndNoListedName) {
+  for (const char* effect :
+       {"own.gain_ranging", "own.worn_tooth", "own.cable_pull", "own.compressor", "own.stiction"}) {
+    const SetOutcome outcome = run_set({.seed = 120002,
+                                        .effects = {effect},
+                                        .size = 3,
+                                        .order = sim::RecordOrder::raster,
+                                        .noise = NoiseKind::examples,
+                                        .bits = 16,
+                                        .static_s = 1800});
+    ASSERT_TRUE(outcome.feasible) << effect;
+    EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
+    EXPECT_EQ(outcome.listed_instead, 0) << outcome.truth << " / " << outcome.found;
+    EXPECT_LT(outcome.after.heldout, 1.2 * outcome.oracle.heldout) << outcome.truth;
+  }
+}
+
 SetDesign coarse_in_slow_noise(std::uint64_t seed, const char* effect, sim::RecordOrder order) {
   return {.seed = seed,
           .effects = {effect},

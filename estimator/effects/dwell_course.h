@@ -1,0 +1,17 @@
+// Structure without a name within the dwells.
+#pragma once
+
+#include <memory>
+
+#include "estimator/effects/smooth_term.h"
+
+namespace plumbline {
+
+/// What a course over the dwell is multiplied with.
+enum class CourseOf { one, component, step };
+
+/// The same course in every dwell: a polynomial of the logarithm of the time since arrival, without
+/// its mean over the dwell.
+std::unique_ptr<SmoothTerm> dwell_course(const VisitLog& log, CourseOf of, int degree);
+
+}  // namespace plumbline

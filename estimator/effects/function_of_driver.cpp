@@ -1,0 +1,410 @@
+#include "estimator/effects/function_of_driver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+/// A function of one driver; the shape is the derived class's.
+class FunctionOfDriver : public SmoothTerm {
+ public:
+  FunctionOfDriver(DriverPointer driver, Target target)
+      : driver_(std::move(driver)), target_(target) {}
+
+  std::string id() const override {
+    return "unlisted:" + driver_->name + ":" + to_string(target_.form);
+  }
+  const std::string& driver() const override { return driver_->name; }
+  TermForm form() const override { return target_.form; }
+  std::string shape() const override {
+    return function() + (driver_->past.empty() ? "" : " in the " + driver_->past) + target_.words();
+  }
+  Subject subject() const override {
+    return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
+  }
+  void displace(const VisitLog&, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    turned(head) += of_visit(0, visit, p) * effect::kRadPerDeg;
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    const double f = driver_->output_of == input.axis ? at(input.output_V, p)
+                                                      : of_visit(input.axis, input.visit, p);
+    if (target_.form != TermForm::scale) return f;
+    return f * component_g(input, target_.other) *
+           (target_.second ? component_g(input, *target_.second) : 1);
+  }
+
+ protected:
+  virtual std::string function() const = 0;
+  /// The function at one value of the driver, for those that depend on nothing else.
+  virtual double at(double, const double*) const { return 0; }
+  virtual double of_visit(std::size_t axis, std::size_t visit, const double* p) const {
+    return at(driver_->value[axis][visit], p);
+  }
+
+  /// A place in the range.
+  ParameterInfo place(const char* name) const {
+    const auto [low, high] = range();
+    constexpr double kFine = 1e-3;
+    return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
+  }
+  std::pair<double, double> range() const {
+    double low = driver_->value[0].front(), high = low;
+    for (const auto& values : driver_->value) {
+      const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
+      low = std::min(low, *least);
+      high = std::max(high, *greatest);
+    }
+    return {low, high};
+  }
+  const Driver& variable() const { return *driver_; }
+  const Target& target() const { return target_; }
+  /// Whether what is linear in the driver is not to be told from the 12 parameters.
+  bool is_in_the_twelve() const { return driver_->in_the_twelve && target_.form == TermForm::bias; }
+
+ private:
+  static double component_g(const TermInput& input, std::size_t other) {
+    return input.a_g[input.visit](static_cast<Eigen::Index>((input.axis + other) % kAxisCount));
+  }
+  double& turned(HeadGeometry& head) const {
+    switch (target_.angle) {
+      case Target::Angle::delta:
+        break;
+      case Target::Angle::h:
+        return head.h_rad;
+      case Target::Angle::base_roll:
+        return head.roll_rad;
+      case Target::Angle::skew:
+        return head.skew_rad;
+    }
+    return head.delta_rad;
+  }
+
+  DriverPointer driver_;
+  Target target_;
+};
+
+/// Legendre polynomials of degree 1 … d over the range that was seen.
+class Polynomial final : public FunctionOfDriver {
+ public:
+  Polynomial(DriverPointer driver, Target target, int degree)
+      : FunctionOfDriver(std::move(driver), target), degree_(degree) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    std::vector<ParameterInfo> infos = {{"low", "", ParameterRole::index},
+                                        {"high", "", ParameterRole::index}};
+    for (int d = 1; d <= degree_; ++d)
+      infos.push_back({"p" + std::to_string(d), target().unit(), ParameterRole::amplitude});
+    return infos;
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    std::vector<double> p(parameters().size(), target().typical_size());
+    std::tie(p[0], p[1]) = range();
+    if (is_in_the_twelve()) {
+      if (degree_ == 1) return {};
+      p[2] = 0;
+    }
+    return {{std::move(p)}};
+  }
+
+ private:
+  std::string function() const override {
+    return "polynomial of degree " + std::to_string(degree_);
+  }
+  double at(double value, const double* p) const override {
+    const double x = std::clamp((2 * value - p[0] - p[1]) / (p[1] - p[0]), -1.0, 1.0);
+    // Bonnet's recursion.
+    double before = 1, now = x, sum = p[2] * x;
+    for (int d = 2; d <= degree_; ++d) {
+      before = std::exchange(now, ((2 * d - 1) * x * now - (d - 1) * before) / d);
+      sum += p[d + 1] * now;
+    }
+    return sum;
+  }
+
+  int degree_;
+};
+
+class HarmonicSeries final : public FunctionOfDriver {
+ public:
+  HarmonicSeries(DriverPointer driver, Target target, int order)
+      : FunctionOfDriver(std::move(driver), target), order_(order) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    std::vector<ParameterInfo> infos;
+    for (int d = 1; d <= order_; ++d) {
+      infos.push_back({"c" + std::to_string(d), target().unit(), ParameterRole::amplitude});
+      infos.push_back({"s" + std::to_string(d), target().unit(), ParameterRole::amplitude});
+    }
+    return infos;
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    return {{std::vector<double>(parameters().size(), target().typical_size())}};
+  }
+
+ private:
+  std::string function() const override {
+    return "harmonic series of order " + std::to_string(order_);
+  }
+  double at(double value, const double* p) const override {
+    double sum = 0;
+    for (int d = 1; d <= order_; ++d)
+      sum += p[2 * d - 2] * std::cos(d * value) + p[2 * d - 1] * std::sin(d * value);
+    return sum;
+  }
+
+  int order_;
+};
+
+class Wave final : public FunctionOfDriver {
+ public:
+  Wave(DriverPointer driver, Target target, const Cycles& cycles, double shortest)
+      : FunctionOfDriver(std::move(driver), target), cycles_(cycles), shortest_(shortest) {}
+
+  bool repeats() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"start", "", ParameterRole::index},
+            {"period", "", ParameterRole::shape},
+            {"c", target().unit(), ParameterRole::amplitude},
+            {"s", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    const double size = target().typical_size();
+    std::vector<Hypothesis> starts;
+    const auto steps = std::lround((cycles_.most - cycles_.least) / cycles_.step);
+    for (long k = 0; k <= steps; ++k) {
+      const double period = (high - low) / (cycles_.least + static_cast<double>(k) * cycles_.step);
+      if (period >= shortest_) starts.push_back({{low, period, size, size}});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "wave"; }
+  double at(double value, const double* p) const override {
+    const double phase = 2 * std::numbers::pi * (value - p[0]) / p[1];
+    return p[2] * std::cos(phase) + p[3] * std::sin(phase);
+  }
+
+  Cycles cycles_;
+  double shortest_;
+};
+
+class Bell final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    const char* unit = variable().angle ? "rad" : "";
+    return {place("middle"),
+            {"width", unit, ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : {1.0 / 60, 1.0 / 30, 1.0 / 15}) {
+      const double width = share * (high - low);
+      const auto steps = static_cast<long>((high - low) / (1.5 * width));
+      for (long k = 0; k <= steps; ++k)
+        starts.push_back(
+            {{low + 1.5 * width * static_cast<double>(k), width, target().typical_size()}});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "bell"; }
+  double at(double value, const double* p) const override {
+    const double away = value - p[0];
+    const double x = (variable().angle ? std::remainder(away, effect::kTurn_rad) : away) / p[1];
+    return p[2] * std::exp(-0.5 * x * x);
+  }
+};
+
+class Pulses final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    constexpr double kFine = 0.1;  // of an edge, so that some readings are in it
+    const double fine = kFine * edge();
+    return {{"edge", "s", ParameterRole::index},
+            {"period", "s", ParameterRole::shape, fine},
+            {"width", "s", ParameterRole::shape, fine},
+            {"middle", "s", ParameterRole::shape, fine, true},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    constexpr int kMiddles = 4, kMostPulses = 8;
+    std::vector<Hypothesis> starts;
+    for (int pulses = 2; pulses <= kMostPulses; ++pulses) {
+      const double period = (high - low) / pulses;
+      for (int k = 0; k < kMiddles; ++k)
+        starts.push_back(
+            {{edge(), period, 0.5 * period, low + period * k / kMiddles, target().typical_size()}});
+    }
+    return starts;
+  }
+  std::vector<Hypothesis> in_one(const std::string& repeated,
+                                 const std::vector<std::vector<double>>& instances) const override {
+    if (repeated != "sensor.bias_step" || target().form != TermForm::bias) return {};
+    std::vector<double> up, down;
+    for (const auto& step : instances) (step[0] > 0 ? up : down).push_back(step[1]);
+    std::vector<Hypothesis> found;
+    for (const auto& same : {up, down})
+      for (const double first : same)
+        for (const double second : same)
+          for (int pulses = 1; pulses <= 4 && second > first; ++pulses)
+            add_if_regular(up, down, (second - first) / pulses, found);
+    return found;
+  }
+
+ private:
+  std::string function() const override { return "train of pulses"; }
+  double at(double value, const double* p) const override {
+    const double from_middle = std::abs(std::remainder(value - p[3], p[1]));
+    return p[4] / (1 + std::exp((from_middle - 0.5 * p[2]) / p[0]));
+  }
+  /// A part of the time from pose to pose, over which an edge is spread so that it can be moved.
+  double edge() const {
+    constexpr double kPart = 0.25;
+    const auto [low, high] = range();
+    return kPart * (high - low) / static_cast<double>(variable().value[0].size());
+  }
+  void add_if_regular(const std::vector<double>& up, const std::vector<double>& down, double period,
+                      std::vector<Hypothesis>& found) const {
+    constexpr double kSame = 8;  // edges: two poses
+    if (up.empty() || down.empty() || period < 4 * kSame * edge()) return;
+    for (const auto& same : {up, down})
+      for (const double t : same)
+        if (std::abs(std::remainder(t - same.front(), period)) > kSame * edge()) return;
+    double width = std::fmod(down.front() - up.front(), period);
+    if (width < 0) width += period;
+    found.push_back({{edge(), period, width, up.front() + 0.5 * width, target().typical_size()}});
+  }
+};
+
+class Bend final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", "", ParameterRole::index},
+            {"high", "", ParameterRole::index},
+            {"side", "", ParameterRole::index},
+            place("at"),
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 8;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int k = 1; k < kParts; ++k) {
+      const double at = low + (high - low) * k / kParts;
+      starts.push_back({{low, high, 1, at, target().typical_size()}});
+      // The two sides differ by a straight line.
+      if (!is_in_the_twelve()) starts.push_back({{low, high, -1, at, target().typical_size()}});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "bend"; }
+  double at(double value, const double* p) const override {
+    // A bend at the very end is none: it would follow the last readings, whatever they are.
+    constexpr double kEnd = 0.08;
+    const double end = kEnd * (p[1] - p[0]);
+    if (p[3] < p[0] + end || p[3] > p[1] - end) return 0;
+    return p[4] * std::max(0.0, p[2] * (value - p[3]));
+  }
+};
+
+class PlayLag final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : effect::geometric(0.01, 0.64, 7))
+      starts.push_back({{share * (high - low), target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "lag behind a play"; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const std::vector<double>& driver = variable().value[axis];
+    const double half = 0.5 * std::abs(p[0]);
+    double follower = driver.front();
+    for (std::size_t k = 0; k <= visit; ++k)
+      follower = std::clamp(follower, driver[k] - half, driver[k] + half);
+    return p[1] * (follower - driver[visit]);
+  }
+};
+
+}  // namespace
+
+std::string Target::words() const {
+  if (form == TermForm::geometry) {
+    switch (angle) {
+      case Angle::delta:
+        break;
+      case Angle::h:
+        return ", added to h";
+      case Angle::base_roll:
+        return ", added to the base roll";
+      case Angle::skew:
+        return ", added to the skew of the spindle";
+    }
+    return ", added to delta";
+  }
+  static const char* const kComponent[] = {"its own component", "the component of the next axis",
+                                           "the component of the axis after the next"};
+  if (form != TermForm::scale || (other == 0 && !second)) return "";
+  return std::string(", times ") + kComponent[other] +
+         (second ? std::string(" and ") + kComponent[*second] : "");
+}
+
+const char* Target::unit() const {
+  return form == TermForm::geometry ? "deg" : form == TermForm::scale ? "" : "g";
+}
+
+double Target::typical_size() const {
+  return form == TermForm::geometry ? effect::kSmallAngle_deg : effect::kSmallTerm;
+}
+
+std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree) {
+  return std::make_unique<Polynomial>(std::move(driver), target, degree);
+}
+std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order) {
+  return std::make_unique<HarmonicSeries>(std::move(driver), target, order);
+}
+std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
+                                 double shortest) {
+  return std::make_unique<Wave>(std::move(driver), target, cycles, shortest);
+}
+std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target) {
+  return std::make_unique<Bell>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
+  return std::make_unique<Pulses>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
+  return std::make_unique<Bend>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
+  return std::make_unique<PlayLag>(std::move(driver), target);
+}
+
+}  // namespace plumbline

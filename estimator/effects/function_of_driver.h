@@ -1,0 +1,53 @@
+// Functions of one variable with free coefficients, added to a bias, a scale or an angle: the
+// shapes that structure without a name is described with.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "estimator/effects/driver.h"
+#include "estimator/effects/smooth_term.h"
+
+namespace plumbline {
+
+using DriverPointer = std::shared_ptr<const Driver>;
+
+/// What a function of the visits acts on.
+struct Target {
+  enum class Angle { delta, h, base_roll, skew };
+
+  TermForm form = TermForm::bias;
+  Angle angle = Angle::delta;  ///< geometry
+  /// Scale: the components multiplied are those of axes i + other and, if any, i + second.
+  std::size_t other = 0;
+  std::optional<std::size_t> second = {};
+
+  std::string words() const;
+  const char* unit() const;
+  double typical_size() const;
+};
+
+/// Numbers of cycles in the range of a driver: least, least + step … most.
+struct Cycles {
+  double least, step, most;
+};
+
+/// Legendre polynomials of degree 1 … `degree` over the range that was seen, held beyond it.
+std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree);
+/// Harmonics of order 1 … `order` of an angle.
+std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order);
+/// One wave of unknown period, none shorter than `shortest`.
+std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
+                                 double shortest = 0);
+/// A bell of unknown middle and width: something that happened once and took a while, or one place
+/// of an angle.
+std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
+/// There for part of every period, of unknown length and width: something switches on and off.
+std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
+/// Nothing on one side of an unknown value, proportional to the distance from it on the other.
+std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
+/// What follows the driver through a play of unknown width lags behind it by this function.
+std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
+
+}  // namespace plumbline
