@@ -159,7 +159,6 @@ bool rounded_as_declared(const CalibrationInput& input, std::size_t axis) {
 
 /// What the covariance lacks since the powers of the noise are estimates, too.
 Eigen::Matrix4d allowance_for_noise(const Experiment& experiment, const AxisWork& work) {
-  if (work.test.present.empty()) return Eigen::Matrix4d::Zero();
   const Eigen::Matrix4d& C = work.fit.estimate.covariance;
   return 2 * C *
          allowance_for_powers(experiment.processes, work.test.present, work.test.information,

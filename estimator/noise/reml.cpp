@@ -265,6 +265,7 @@ Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
                                      const std::vector<Eigen::Index>& present,
                                      const Eigen::MatrixXd& information, const Eigen::MatrixXd& V,
                                      const Eigen::MatrixXd& X, const Eigen::MatrixXd& C) {
+  if (present.empty()) return Eigen::MatrixXd::Zero(C.rows(), C.cols());
   const Eigen::LLT<Eigen::MatrixXd> factor(V);
   const Eigen::MatrixXd B = factor.solve(X);
   const auto count = std::ssize(present);

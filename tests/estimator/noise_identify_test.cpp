@@ -262,6 +262,9 @@ TEST(AllowanceForPowers, OnePowerScalesEverythingAndMovesNothing) {
   const Eigen::MatrixXd M =
       allowance_for_powers(one, {kTermN}, Eigen::MatrixXd::Constant(1, 1, 50), V, run.design, C);
   EXPECT_LT((C * M * C).norm(), 1e-9 * C.norm());
+  const Eigen::MatrixXd nothing =
+      allowance_for_powers(one, {}, Eigen::MatrixXd(0, 0), V, run.design, C);
+  EXPECT_EQ(nothing, Eigen::MatrixXd::Zero(4, 4)) << "noise that is known needs none";
 }
 
 // K_z hangs on what changes slowly, and a few slow noise values say little of their own variance.
