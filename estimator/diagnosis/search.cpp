@@ -338,7 +338,6 @@ class Search {
 
   /// What happened again and again on an axis may be one thing that repeats.
   void tell_in_one() {
-    constexpr std::size_t kOften = 3;
     for (std::size_t k = 0; k < chosen_.size(); ++k) {
       const Candidate& first = list_.candidates[chosen_[k]];
       std::vector<std::size_t> instances;
@@ -349,7 +348,7 @@ class Search {
         instances.push_back(l);
         p.push_back(stage_.fit.parameters.effects[l].p);
       }
-      if (instances.size() >= kOften && replace_in_one(instances, p)) return;
+      if (instances.size() > 1 && replace_in_one(instances, p)) return;
     }
   }
 

@@ -34,6 +34,7 @@ Driver load(const VisitLog& log);
 /// What recorded columns and the specific force of the own axis were on average lately, weighted by
 /// exp(−age/τ), for the time constants of kMemory_s.
 std::vector<Driver> remembered_drivers(const VisitLog& log);
-inline constexpr double kMemory_s[] = {30, 60, 120, 300, 600, 1200, 2400, 4800};
+inline constexpr double kMemory_s[] = {30,  42,  60,  85,   120,  170,  230,  300,
+                                       420, 600, 850, 1200, 1700, 2400, 3400, 4800};
 
 }  // namespace plumbline

@@ -254,16 +254,9 @@ class Pulses final : public FunctionOfDriver {
   }
   std::vector<Hypothesis> in_one(const std::string& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
-    if (repeated != "sensor.bias_step" || target().form != TermForm::bias) return {};
-    std::vector<double> up, down;
-    for (const auto& step : instances) (step[0] > 0 ? up : down).push_back(step[1]);
-    std::vector<Hypothesis> found;
-    for (const auto& same : {up, down})
-      for (const double first : same)
-        for (const double second : same)
-          for (int pulses = 1; pulses <= 4 && second > first; ++pulses)
-            add_if_regular(up, down, (second - first) / pulses, found);
-    return found;
+    if (target().form != TermForm::bias) return {};
+    if (repeated == "sensor.bias_step") return from_steps(instances);
+    return repeated == id() ? from_waves(instances) : std::vector<Hypothesis>{};
   }
 
  private:
@@ -277,6 +270,35 @@ class Pulses final : public FunctionOfDriver {
     constexpr double kPart = 0.25;
     const auto [low, high] = range();
     return kPart * (high - low) / static_cast<double>(variable().value[0].size());
+  }
+  /// Steps up and down, some of which may not have been found.
+  std::vector<Hypothesis> from_steps(const std::vector<std::vector<double>>& steps) const {
+    constexpr std::size_t kOften = 3;
+    if (steps.size() < kOften) return {};
+    std::vector<double> up, down;
+    for (const auto& step : steps) (step[0] > 0 ? up : down).push_back(step[1]);
+    std::vector<Hypothesis> found;
+    for (const auto& same : {up, down})
+      for (const double first : same)
+        for (const double second : same)
+          for (int pulses = 1; pulses <= 4 && second > first; ++pulses)
+            add_if_regular(up, down, (second - first) / pulses, found);
+    return found;
+  }
+  /// The longest of several waves is the fundamental.
+  std::vector<Hypothesis> from_waves(const std::vector<std::vector<double>>& waves) const {
+    std::vector<double> longest;
+    for (const auto& wave : waves) {
+      if (wave.size() != 4) return {};  // another shape
+      if (longest.empty() || wave[1] > longest[1]) longest = wave;
+    }
+    const double period = longest[1];
+    const double crest =
+        longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
+    std::vector<Hypothesis> found;
+    for (const double share : {0.2, 0.35, 0.5, 0.65, 0.8})
+      found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
+    return found;
   }
   void add_if_regular(const std::vector<double>& up, const std::vector<double>& down, double period,
                       std::vector<Hypothesis>& found) const {
