@@ -208,8 +208,8 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
   }
   for (const UnlistedStructure& structure : diagnosis.unlisted) {
     diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ");
-    diagnosis.reason += "unlisted: a " + structure.shape + " in " + structure.driver +
-                        " changes the " + structure.form;
+    diagnosis.reason += "unlisted: " + structure.driver + " changes the " + structure.form + " (" +
+                        structure.shape + ")";
   }
   return diagnosis;
 }
