@@ -127,10 +127,13 @@ class SocketCanOutput final : public FrameOutput {
   Result<void> send(const can_frame& frame) override {
     const auto until = std::chrono::steady_clock::now() + kPatience;
     while (::write(socket_.get(), &frame, sizeof frame) != sizeof frame) {
-      // A full transmit queue, or an interface that is down for a while, as after bus-off.
-      if (errno != ENOBUFS && errno != EAGAIN && errno != EINTR && errno != ENETDOWN) {
+      // A full transmit queue, or an interface that is down for a while, as after bus-off; one that
+      // was unplugged comes back under the same name, but is another one.
+      const bool gone = errno == ENODEV || errno == ENXIO;
+      if (!gone && errno != ENOBUFS && errno != EAGAIN && errno != EINTR && errno != ENETDOWN) {
         return fail(ErrorCode::rig, fmt::format("{}: cannot send: {}", endpoint_, reason()));
       }
+      if (gone && open()) continue;
       if (stuck_ || std::chrono::steady_clock::now() >= until) {
         stuck_ = true;
         ++dropped_;

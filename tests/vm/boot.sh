@@ -71,6 +71,10 @@ for item in "$@"; do
   [ "$item" = "$file" ] || target=${item#*:}
   if [ -x "$file" ]; then add_program "$file" "$target"; else install -D -m 644 "$file" "$root/$target"; fi
 done
+# A run with --out writes a certificate, which needs its fonts.
+for font in /usr/share/fonts/truetype/{liberation2/LiberationSans-{Regular,Bold,Italic},dejavu/DejaVuSans{,-Bold}}.ttf; do
+  install -D -m 644 "$font" "$root/$font"
+done
 install -m 755 "$script" "$root/test/script"
 
 cat >"$root/init" <<'INIT'

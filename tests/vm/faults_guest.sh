@@ -1,5 +1,5 @@
 # Runs inside the virtual machine, in /test, with busybox sh: a run over real SocketCAN while the bus
-# loses frames (netem), reports bus-off, and goes down and up.
+# loses frames (netem), reports bus-off, goes down and up, and is unplugged and plugged in again.
 /bin/ip link add dev vcan0 type vcan && /bin/ip link set vcan0 up || exit 1
 insmod /modules/sch_netem.ko || exit 1
 /bin/tc qdisc add dev vcan0 root netem loss 1% || { echo "no netem"; exit 1; }
@@ -33,6 +33,11 @@ wait_for 4
 /bin/ip link set vcan0 down
 sleep 4
 /bin/ip link set vcan0 up
+wait_for 8
+# The interface that comes back has another index: what was bound to the old one is bound to nothing.
+/bin/ip link del dev vcan0
+sleep 4
+/bin/ip link add dev vcan0 type vcan && /bin/ip link set vcan0 up || exit 1
 wait $run
 status=$?
 kill $simrig
@@ -44,4 +49,5 @@ echo "plumbline run ended with $status"
 ./plumbline export --db /tmp/run.db --run 1 --out /tmp/samples.csv || exit 1
 grep -q '"recoveries": 0' /tmp/exit.json && { echo "nothing had to be recovered from"; exit 1; }
 grep -a -q 'error frames' /tmp/run.db || { echo "the bus was not reported on"; exit 1; }
-echo "real SocketCAN: losses, bus-off and a link that went down were survived"
+grep -a -q 'still plugged in' /tmp/run.db || { echo "the adapter was not missed"; exit 1; }
+echo "real SocketCAN: losses, bus-off, a link that went down and an adapter that was unplugged were survived"

@@ -5,10 +5,5 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 build=$1
 worlds=$here/../../rig/sim/worlds
-# The fonts of the certificate, at their places.
-fonts=()
-for font in /usr/share/fonts/truetype/{liberation2/LiberationSans-{Regular,Bold,Italic},dejavu/DejaVuSans{,-Bold}}.ttf; do
-  fonts+=("$font:${font#/}")
-done
 exec "$here/boot.sh" "$build/vm" "$here/socketcan_guest.sh" \
-  "$build/plumbline" "$build/plumbline-simrig" "$here/rig.toml" "$worlds/white.toml" "${fonts[@]}"
+  "$build/plumbline" "$build/plumbline-simrig" "$here/rig.toml" "$worlds/white.toml"
