@@ -168,12 +168,14 @@ TEST_F(SequencerRecovery, AConverterThatHangsAndOneThatIsOverdrivenAreNotBelieve
 }
 
 TEST_F(SequencerRecovery, AConverterThatComesBackAmongTheSamplesIsNotBelieved) {
-  // It hangs on every way, and comes back here before, there while the samples are taken.
+  // It hangs on every third way, and comes back here before, there while the samples are taken,
+  // which takes 3 s.
   rig_.recovery.attempts_per_pose = 12;
+  rig_.plan.samples_per_pose = 300;
   std::string faults;
-  for (int move = 1; move < 24; ++move) {
+  for (int move = 1; move < 24; move += 3) {
     faults += fault("can.stuck_code", fmt::format("axis = \"x\"\nmove = {}\nduration_s = {}", move,
-                                                  3.0 + 0.15 * (move % 12)));
+                                                  3.5 + 0.1 * move));
   }
   start_rig(faults);
   expect_finished(run());
