@@ -161,13 +161,15 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
   // enough to be told from chance.
   double first = 0, last = 0;
-  for (double step = std::min(kCoarsest, (range + 1) / 4); step > kFinest; step *= 1 - resolution) {
-    if (fit(step).good) {
-      if (first == 0) first = step;
-      last = step;
+  double tried = std::min(kCoarsest, (range + 1) / 4);
+  while (tried > kFinest) {
+    if (fit(tried).good) {
+      if (first == 0) first = tried;
+      last = tried;
     } else if (first > 0) {
       break;
     }
+    tried *= 1 - resolution;
   }
   if (first == 0) return {};
   double least_spread = tolerance;

@@ -70,9 +70,9 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
       add_polynomials(driver, target, {1, 2, 3, 5});
     const bool clock = driver->name == "t_s", rate = driver->name.ends_with(".rate");
     if (driver->recorded || clock) {
-      for (const std::size_t other : {1, 2})
+      for (std::size_t other = 1; other < kAxisCount; ++other)
         add_polynomials(driver, {.form = TermForm::scale, .other = other}, {1, 2});
-      for (const std::size_t other : {0, 1, 2})
+      for (std::size_t other = 0; other < kAxisCount; ++other)
         for (std::size_t second = other; second < kAxisCount; ++second)
           add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add_polynomials(driver, of_roll, {1, 2, 3});

@@ -184,7 +184,8 @@ TEST(CodeFaults, AHighBitThatFewReadingsCrossIsNamed) {
 
 TEST(CodeFaults, SpikesOfTheSizeOfABitAreNoStuckBit) {
   MeasurementSet set = poses_with([](std::int64_t code) { return code; });
-  for (const std::size_t k : {100, 5000, 9000}) set.samples.u_V[0][k] -= 70 * kTwelveBits.lsb_V();
+  for (const std::size_t k : {100U, 5000U, 9000U})
+    set.samples.u_V[0][k] -= 70 * kTwelveBits.lsb_V();
   EXPECT_TRUE(code_faults(set, 0, kTwelveBits).stuck_bits.empty());
 }
 
