@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/effects/visit_log.h"
@@ -17,6 +18,8 @@ struct Driver {
   bool angle = false;                  ///< periodic in 2π
   bool recorded = false;               ///< a column of the measurement file
   bool in_the_twelve = false;          ///< a bias proportional to it is what K and U₀ describe
+  /// Where the values can lie; without it, where they do.
+  std::optional<std::pair<double, double>> span = {};
   /// The output of this axis. On the axis itself the model's output stands for it: readings that
   /// explain themselves prove nothing.
   std::optional<std::size_t> output_of = {};

@@ -53,6 +53,7 @@ class FunctionOfDriver : public SmoothTerm {
     return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
   }
   std::pair<double, double> range() const {
+    if (driver_->span) return *driver_->span;
     double low = driver_->value[0].front(), high = low;
     for (const auto& values : driver_->value) {
       const auto [least, greatest] = std::minmax_element(values.begin(), values.end());

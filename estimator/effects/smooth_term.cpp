@@ -38,6 +38,7 @@ Driver code_driver(const VisitLog& log, std::size_t axis) {
 /// δ as a stretch from 0 to 360°.
 Driver angle_without_return(const VisitLog& log) {
   Driver driver{"delta_deg", "angle that does not close", {}};
+  driver.span = {0, effect::kTurn_rad};  // a cable is at rest half way
   for (const Visit& visit : log.visits)
     for (auto& values : driver.value) {
       const double turn = std::fmod(visit.delta_rad, effect::kTurn_rad);
