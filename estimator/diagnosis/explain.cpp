@@ -197,7 +197,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
   if (found.evidence.empty()) return without_effects();
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
-  found.fit.covariance += allowance_for_noise(search, found);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
+  found.fit.covariance += allowance_for_noise(search, found, jacobian);
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);
@@ -209,7 +210,6 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const auto twelve_V = predict_means_V(log, bare);
   const Gravity& gravity = input.input.description.gravity;
 
-  const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   const auto n = std::ssize(input.poses);
   const auto joint = joint_estimate(input, search, found);
   if (joint) {

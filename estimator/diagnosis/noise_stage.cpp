@@ -79,10 +79,6 @@ bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
                      });
 }
 
-}  // namespace
-
-namespace {
-
 /// What the static record says of the noise of an axis: nothing where rounding matters.
 NoiseModel record_of(const SearchInput& input, std::size_t axis, bool coarse) {
   return coarse || input.log.codes[axis].coarser_lattice ? without_record(input.noise[axis])
@@ -168,23 +164,20 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters, con
   return stage;
 }
 
-Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found) {
-  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, found.fit.parameters);
+Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found,
+                                    const Eigen::MatrixXd& jacobian) {
   const Eigen::MatrixXd& C = found.fit.covariance;
   const auto n = std::ssize(input.log.visits);
   PerAxis<Eigen::MatrixXd> of_axis;
   parallel_for(kAxisCount, [&](std::size_t i) {
     const Eigen::MatrixXd X = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
-    const Eigen::MatrixXd lower = found.whitening.lower[i].triangularView<Eigen::Lower>();
-    const Eigen::MatrixXd V = lower * lower.transpose();
-    const Eigen::VectorXd& power = found.noise[i].power;
-    std::vector<Eigen::Index> present;
-    for (Eigen::Index k = 0; k < power.size(); ++k)
-      if (power(k) > 0) present.push_back(k);
+    const PooledNoise& noise = found.noise[i];
+    const std::vector<Eigen::Index> present = noise.present();
     const NoisePool pool(input.processes, record_of(input, i, found.coarse[i]), found.own_V2[i]);
-    const Eigen::MatrixXd information =
-        pool.information_of(power, make_projector(V, independent_columns(X)).P, present);
-    of_axis[i] = allowance_for_powers(input.processes, present, information, V, X, C);
+    const Eigen::MatrixXd information = pool.information_of(
+        noise.power, make_projector(noise.covariance, independent_columns(X)).P, present);
+    of_axis[i] =
+        allowance_for_powers(input.processes, present, information, noise.covariance, X, C);
   });
   return 2 * C * (of_axis[0] + of_axis[1] + of_axis[2]) * C;
 }

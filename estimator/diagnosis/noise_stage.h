@@ -40,8 +40,9 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters, const Before& before);
 
 /// What the covariance of the parameters of `found` lacks since the powers of its noise are
-/// estimates, too: allowance_for_powers() of all axes.
-Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found);
+/// estimates, too: allowance_for_powers() of all axes. `jacobian`: prediction_jacobian() there.
+Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found,
+                                    const Eigen::MatrixXd& jacobian);
 
 /// What changes slowly and could pass for slow noise: the time to the second order, powers of the
 /// height of the spindle where the order of the poses makes that slow, and what was

@@ -184,8 +184,7 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
     result.p_structure = merged(judged.p_structure, rich.p_structure);
     if (result.p_structure < kStructureSeen) judged = std::move(rich);
   }
-  for (Eigen::Index i = 0; i < judged.noise.power.size(); ++i)
-    if (judged.noise.power(i) > 0) result.present.push_back(i);
+  result.present = judged.noise.present();
   result.information = pool.information_of(judged.noise.power, judged.P, result.present);
   result.noise = std::move(judged.noise);
   result.chi2 = judged.chi2;

@@ -356,11 +356,9 @@ class Search {
                       const std::vector<std::vector<double>>& p) {
     const Candidate& repeated = list_.candidates[chosen_[instances.front()]];
     const EnlargedFit without = fit_without(instances);
-    double spent = 0;
-    for (const std::size_t k : instances) spent += price(chosen_[k], dof_of(k));
     const Effect* tried = nullptr;
     std::optional<Exchange> best;
-    double best_chi2 = stage_.fit.chi2 + spent;
+    double best_cost = stage_.fit.chi2 + price_of(instances);
     for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
       const Candidate& candidate = list_.candidates[c];
       if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
@@ -370,18 +368,15 @@ class Search {
         const EnlargedFit with = fit_with(without.parameters, active);
         const auto dof = static_cast<int>(std::count(active.free.begin(), active.free.end(), true));
         const double cost = with.chi2 + price(c, dof);
-        if (!with.determined || cost >= best_chi2) continue;
+        if (!with.determined || cost >= best_cost) continue;
         const double p_value = p_of_search(
             log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks_);
         if (p_value > options_.false_alarm) continue;
-        best_chi2 = cost;
+        best_cost = cost;
         best = {c, p_value, with.parameters};
       }
     }
-    if (!best || !adopt(best->parameters)) return false;
-    for (auto k = instances.rbegin(); k != instances.rend(); ++k) forget(*k);
-    choose(best->candidate, best->p);
-    return true;
+    return best && exchange(instances, *best);
   }
 
   int dof_of(std::size_t k) const {
@@ -406,12 +401,8 @@ class Search {
     std::vector<std::vector<Exchange>> exchanges(subsets.size());
     parallel_for(subsets.size(), [&](std::size_t s) { exchanges[s] = exchanges_for(subsets[s]); });
     for (std::size_t s = 0; s < subsets.size(); ++s) {
-      for (const Exchange& exchange : exchanges[s]) {
-        if (!adopt(exchange.parameters)) continue;
-        for (auto k = subsets[s].rbegin(); k != subsets[s].rend(); ++k) forget(*k);
-        choose(exchange.candidate, exchange.p);
-        return true;
-      }
+      for (const Exchange& with : exchanges[s])
+        if (exchange(subsets[s], with)) return true;
     }
     return false;
   }
@@ -423,6 +414,20 @@ class Search {
     EnlargedParameters parameters;
   };
 
+  /// Puts one candidate in the place of a subset, ascending, when its parameters are determined.
+  bool exchange(const std::vector<std::size_t>& subset, const Exchange& with) {
+    if (!adopt(with.parameters)) return false;
+    for (auto k = subset.rbegin(); k != subset.rend(); ++k) forget(*k);
+    choose(with.candidate, with.p);
+    return true;
+  }
+
+  double price_of(const std::vector<std::size_t>& subset) const {
+    double sum = 0;
+    for (const std::size_t k : subset) sum += price(chosen_[k], std::max(1, dof_of(k)));
+    return sum;
+  }
+
   /// Those that are worth their price, likeliest first. Precondition: responses() is up to date.
   std::vector<Exchange> exchanges_for(const std::vector<std::size_t>& subset) const {
     constexpr std::size_t kRefined = 4;
@@ -430,8 +435,7 @@ class Search {
     std::vector<Exchange> exchanges;
     const EnlargedFit without = fit_without(subset);
     if (!without.determined) return exchanges;
-    double spent = 0;
-    for (const std::size_t k : subset) spent += price(chosen_[k], std::max(1, dof_of(k)));
+    const double spent = price_of(subset);
     const CandidateGains gains(*responses_, without);
     const std::vector<Scored> ranked =
         screen(list_, gains, gains.of(without.whitened_residual).col(0));

@@ -6,10 +6,34 @@
 
 namespace plumbline {
 
-std::vector<std::int64_t> codes_seen(const std::vector<double>& u_V, const Adc& adc) {
+namespace {
+
+std::vector<std::int64_t> codes_of(std::span<const double> u_V, const Adc& adc) {
   std::vector<std::int64_t> codes;
   codes.reserve(u_V.size());
   for (const double u : u_V) codes.push_back(std::llround((u - adc.min_V) / adc.lsb_V()));
+  return codes;
+}
+
+std::span<const double> readings_of(const MeasurementSet& set, std::size_t axis, const Pose& pose) {
+  return std::span(set.samples.u_V[axis]).subspan(pose.first, pose.count);
+}
+
+/// The bit at its value, when that is the same in all codes.
+std::optional<StuckBit> unchanging(const std::vector<std::int64_t>& codes, int bit) {
+  const auto is_set = [bit](std::int64_t code) { return ((code >> bit) & 1) != 0; };
+  if (codes.empty()) return {};
+  const bool value = is_set(codes.front());
+  if (!std::all_of(codes.begin(), codes.end(),
+                   [&](std::int64_t code) { return is_set(code) == value; }))
+    return {};
+  return StuckBit{bit, value};
+}
+
+}  // namespace
+
+std::vector<std::int64_t> codes_seen(std::span<const double> u_V, const Adc& adc) {
+  std::vector<std::int64_t> codes = codes_of(u_V, adc);
   std::sort(codes.begin(), codes.end());
   codes.erase(std::unique(codes.begin(), codes.end()), codes.end());
   return codes;
@@ -20,17 +44,12 @@ std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const A
   std::vector<StuckBit> stuck;
   if (codes.size() < kEnough) return stuck;
   const std::int64_t range = codes.back() - codes.front();
-  std::int64_t always = ~std::int64_t{0}, ever = 0;
-  for (const std::int64_t code : codes) {
-    always &= code;
-    ever |= code;
-  }
   int low_run = 0;  // neighbouring stuck bits from the lowest on
   for (int bit = 0; bit < adc.bits; ++bit) {
-    const std::int64_t mask = std::int64_t{1} << bit;
-    if (range < 4 * mask) break;
-    if ((always & mask) == 0 && (ever & mask) != 0) continue;
-    stuck.push_back({bit, (always & mask) != 0});
+    if (range < std::int64_t{4} << bit) break;
+    const std::optional<StuckBit> found = unchanging(codes, bit);
+    if (!found) continue;
+    stuck.push_back(*found);
     if (low_run == bit && stuck.front().value == stuck.back().value) ++low_run;
   }
   if (low_run > 1) stuck.erase(stuck.begin(), stuck.begin() + low_run);
@@ -52,14 +71,11 @@ std::size_t readings_that_jump(const MeasurementSet& set, std::size_t axis, cons
   const std::int64_t sign = stuck.value ? -1 : 1;
   std::size_t jumps = 0;
   for (const Pose& pose : set.poses) {
-    const auto first = set.samples.u_V[axis].begin() + static_cast<std::ptrdiff_t>(pose.first);
-    std::int64_t low = std::numeric_limits<std::int64_t>::max(), high = 0;
-    std::vector<std::int64_t> codes;
-    for (auto u = first; u != first + static_cast<std::ptrdiff_t>(pose.count); ++u) {
-      codes.push_back(sign * std::llround((*u - adc.min_V) / adc.lsb_V()));
-      low = std::min(low, codes.back());
-      high = codes.size() == 1 ? codes.back() : std::max(high, codes.back());
-    }
+    if (pose.count == 0) continue;
+    std::vector<std::int64_t> codes = codes_of(readings_of(set, axis, pose), adc);
+    for (std::int64_t& code : codes) code *= sign;
+    const auto [least, greatest] = std::minmax_element(codes.begin(), codes.end());
+    const std::int64_t low = *least, high = *greatest;
     if (high - low < 3 * size / 4) continue;
     // Those far below belong next to the others, above or below.
     std::int64_t least_moved = low + size, most_moved = low + size, least_kept = high;
@@ -86,13 +102,8 @@ std::vector<StuckBit> jumping_bits(const MeasurementSet& set, std::size_t axis,
   constexpr std::size_t kEnough = 2;  // readings: a single one may be a spike
   std::vector<StuckBit> found;
   for (int bit = kLowest; bit < adc.bits; ++bit) {
-    const std::int64_t mask = std::int64_t{1} << bit;
-    const auto is_set = [mask](std::int64_t code) { return (code & mask) != 0; };
-    const StuckBit stuck{bit, !codes.empty() && is_set(codes.front())};
-    if (std::any_of(codes.begin(), codes.end(),
-                    [&](std::int64_t code) { return is_set(code) != stuck.value; }))
-      continue;
-    if (readings_that_jump(set, axis, adc, stuck) >= kEnough) found.push_back(stuck);
+    const std::optional<StuckBit> stuck = unchanging(codes, bit);
+    if (stuck && readings_that_jump(set, axis, adc, *stuck) >= kEnough) found.push_back(*stuck);
   }
   return found;
 }
@@ -115,9 +126,8 @@ std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const
   constexpr std::size_t kReadingsPerCode = 4;  // at least, so that none is missing by chance
   std::size_t dwells = 0;
   for (const Pose& pose : set.poses) {
-    const auto first = set.samples.u_V[axis].begin() + static_cast<std::ptrdiff_t>(pose.first);
-    const std::vector<std::int64_t> codes = without_bits(
-        codes_seen({first, first + static_cast<std::ptrdiff_t>(pose.count)}, adc), stuck);
+    const std::vector<std::int64_t> codes =
+        without_bits(codes_seen(readings_of(set, axis, pose), adc), stuck);
     if (pose.count < kReadingsPerCode * codes.size()) continue;
     const bool over = std::adjacent_find(codes.begin(), codes.end(),
                                          [](auto a, auto b) { return b - a > 1; }) != codes.end();

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "estimator/measurement.h"
@@ -11,7 +12,7 @@ namespace plumbline {
 
 /// The different codes among the readings, ascending, counted from the lower end of the span; the
 /// functions below take them.
-std::vector<std::int64_t> codes_seen(const std::vector<double>& u_V, const Adc& adc);
+std::vector<std::int64_t> codes_seen(std::span<const double> u_V, const Adc& adc);
 
 /// A bit that has the same value in every reading although the readings pass through both of its
 /// values.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -13,7 +14,9 @@ namespace {
 class FunctionOfDriver : public SmoothTerm {
  public:
   FunctionOfDriver(DriverPointer driver, Target target)
-      : driver_(std::move(driver)), target_(target) {}
+      : driver_(std::move(driver)),
+        target_(target),
+        range_(driver_->span ? *driver_->span : range_of(driver_->value)) {}
 
   std::string id() const override {
     return "unlisted:" + driver_->name + ":" + to_string(target_.form);
@@ -52,16 +55,7 @@ class FunctionOfDriver : public SmoothTerm {
     constexpr double kFine = 1e-3;
     return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
   }
-  std::pair<double, double> range() const {
-    if (driver_->span) return *driver_->span;
-    double low = driver_->value[0].front(), high = low;
-    for (const auto& values : driver_->value) {
-      const auto [least, greatest] = std::minmax_element(values.begin(), values.end());
-      low = std::min(low, *least);
-      high = std::max(high, *greatest);
-    }
-    return {low, high};
-  }
+  const std::pair<double, double>& range() const { return range_; }
   const Driver& variable() const { return *driver_; }
   const Target& target() const { return target_; }
   /// Whether what is linear in the driver is not to be told from the 12 parameters.
@@ -70,6 +64,14 @@ class FunctionOfDriver : public SmoothTerm {
  private:
   static double component_g(const TermInput& input, std::size_t other) {
     return input.a_g[input.visit](static_cast<Eigen::Index>((input.axis + other) % kAxisCount));
+  }
+  static std::pair<double, double> range_of(const PerAxis<std::vector<double>>& of_axis) {
+    constexpr double kBeyond = std::numeric_limits<double>::infinity();
+    std::pair<double, double> range{kBeyond, -kBeyond};
+    for (const auto& values : of_axis)
+      for (const double value : values)
+        range = {std::min(range.first, value), std::max(range.second, value)};
+    return range;
   }
   double& turned(HeadGeometry& head) const {
     switch (target_.angle) {
@@ -87,6 +89,7 @@ class FunctionOfDriver : public SmoothTerm {
 
   DriverPointer driver_;
   Target target_;
+  std::pair<double, double> range_;  ///< asked for whenever a parameter is described
 };
 
 /// Legendre polynomials of degree 1 … d over the range that was seen.

@@ -261,6 +261,13 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
   return 0.5 * information;
 }
 
+std::vector<Eigen::Index> PooledNoise::present() const {
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index i = 0; i < power.size(); ++i)
+    if (power(i) > 0) found.push_back(i);
+  return found;
+}
+
 Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
                                      const std::vector<Eigen::Index>& present,
                                      const Eigen::MatrixXd& information, const Eigen::MatrixXd& V,

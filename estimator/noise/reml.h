@@ -31,6 +31,9 @@ struct PooledNoise {
   /// −2 ln of the full likelihood at these powers but for a constant: comparable between designs.
   double likelihood_deviance = 0;
   bool converged = false;
+
+  /// Processes with power, ascending.
+  std::vector<Eigen::Index> present() const;
 };
 
 /// Restricted maximum likelihood (Patterson & Thompson, 1971) of the powers, all ≥ 0, given window

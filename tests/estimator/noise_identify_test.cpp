@@ -281,9 +281,7 @@ TEST(AllowanceForPowers, EstimatesScatterAsWidelyAsItSays) {
                                   .llt()
                                   .solve(Eigen::Matrix4d::Identity());
     const Eigen::Vector4d x = C * (run.design.transpose() * factor.solve(run.mean));
-    std::vector<Eigen::Index> present;
-    for (Eigen::Index i = 0; i < noise.power.size(); ++i)
-      if (noise.power(i) > 0) present.push_back(i);
+    const std::vector<Eigen::Index> present = noise.present();
     const Eigen::MatrixXd information =
         pool.information_of(noise.power, make_projector(noise.covariance, run.design).P, present);
     const Eigen::Matrix4d allowance =
