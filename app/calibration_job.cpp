@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "app/certificate/certificate_files.h"
 #include "app/config/rig_description.h"
@@ -16,6 +17,7 @@
 #include "app/issue_time.h"
 #include "app/sequencer/separation_plan.h"
 #include "app/summary.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline::app {
 
@@ -116,20 +118,28 @@ Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64
   if (!description) return fail(description.error());
   job.description = *std::move(description);
   job.provenance.dut = job.description.dut;
-  auto run = read_samples(files.samples, {.skip_bad_rows = files.skip_bad_rows});
+  const CsvOptions rows{.skip_bad_rows = files.skip_bad_rows};
+  Result<MeasurementSet> run;
+  Result<StaticRecord> record;
+  std::vector<std::filesystem::path> inputs = {files.samples, files.static_record, files.config};
+  if (files.static_record.empty()) inputs.erase(inputs.begin() + 1);
+  std::vector<Result<std::string>> hashes(inputs.size());
+  const std::vector<std::function<void()>> readings = {
+      [&] { run = read_samples(files.samples, rows); },
+      [&] {
+        if (!files.static_record.empty()) record = read_static(files.static_record, rows);
+      },
+      [&] { std::transform(inputs.begin(), inputs.end(), hashes.begin(), sha256_of_file); },
+  };
+  parallel_for(readings.size(), [&](std::size_t k) { readings[k](); });
   if (!run) return fail(run.error());
+  if (!record) return fail(record.error());
   job.run = *std::move(run);
-  if (!files.static_record.empty()) {
-    auto record = read_static(files.static_record, {.skip_bad_rows = files.skip_bad_rows});
-    if (!record) return fail(record.error());
-    job.static_record = std::move(record->samples);
-    job.run.skipped_rows += record->skipped_rows;
-  }
-  for (const auto& file : {files.samples, files.static_record, files.config}) {
-    if (file.empty()) continue;
-    auto hash = sha256_of_file(file);
-    if (!hash) return fail(hash.error());
-    job.provenance.input_sha256.emplace_back(file.string(), *std::move(hash));
+  job.static_record = std::move(record->samples);
+  job.run.skipped_rows += record->skipped_rows;
+  for (std::size_t k = 0; k < inputs.size(); ++k) {
+    if (!hashes[k]) return fail(hashes[k].error());
+    job.provenance.input_sha256.emplace_back(inputs[k].string(), *std::move(hashes[k]));
   }
   return job;
 }

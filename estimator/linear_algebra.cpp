@@ -51,8 +51,8 @@ double propagated_variance(const Eigen::MatrixXd& information, const Eigen::Vect
 }
 
 Eigen::MatrixXd orthonormal_basis(const Eigen::MatrixXd& columns) {
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(
-      columns * columns.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal());
+  const Eigen::RowVectorXd scale = columns.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(columns * scale.asDiagonal());
   qr.setThreshold(1e-8);
   return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), qr.rank());
 }

@@ -162,7 +162,7 @@ class OwnEffect final : public Effect {
     }
   }
   double term_g(const TermInput& input, const double* p) const override {
-    if (!within_dwell_) return sample_term_g(input, p, mean_time_in_pose_s(input.log, input.visit));
+    if (!within_dwell_) return sample_g(input, p, mean_time_in_pose_s(input.log, input.visit));
     // The mean of the dwell, from so many of its samples.
     constexpr std::size_t kMost = 32;
     const Visit& visit = input.at();
@@ -172,14 +172,13 @@ class OwnEffect final : public Effect {
     const double first_s = 0.5 * (step_s - visit.step_s);
     double sum = 0;
     for (std::size_t k = 0; k < points; ++k)
-      sum += sample_term_g(input, p, first_s + step_s * static_cast<double>(k));
+      sum += sample_g(input, p, first_s + step_s * static_cast<double>(k));
     return sum / static_cast<double>(points);
   }
   bool within_dwell() const override { return within_dwell_; }
-  double sample_term_g(const TermInput& input, const double* p,
-                       double since_arrival_s) const override {
-    const double term = value(input.log, input.visit, &input.a_g, &input.axis, p, since_arrival_s);
-    return description_.target == Target::scale ? term * input.a() : term;
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
+    const auto value_at = [&](double since_s) { return sample_g(input, p, since_s); };
+    return effect::since_arrival_s(input.at()).unaryExpr(value_at).matrix();
   }
   std::string definition() const override;
   const std::vector<std::string>& columns() const { return columns_; }
@@ -200,6 +199,10 @@ class OwnEffect final : public Effect {
   }
 
  private:
+  double sample_g(const TermInput& input, const double* p, double since_arrival_s) const {
+    const double term = value(input.log, input.visit, &input.a_g, &input.axis, p, since_arrival_s);
+    return description_.target == Target::scale ? term * input.a() : term;
+  }
   static double mean_time_in_pose_s(const VisitLog& log, std::size_t visit) {
     return log.visits[visit].t_mean_s - log.visits[visit].t_arrival_s;
   }

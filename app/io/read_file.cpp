@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
+#include <vector>
 
 namespace plumbline::app {
 
@@ -16,7 +17,10 @@ Result<std::string> read_file(const std::filesystem::path& path) {
   }
   errno = 0;
   std::ifstream stream(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::string text;
+  std::vector<char> block(1 << 20);
+  while (stream.read(block.data(), std::ssize(block)), stream.gcount() > 0)
+    text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
   if (!stream.is_open() || stream.bad()) {
     return fail(ErrorCode::input,
                 fmt::format("{}: {}", path.string(), std::generic_category().message(errno)));

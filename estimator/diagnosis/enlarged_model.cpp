@@ -184,13 +184,8 @@ PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
 }
 
 Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active) {
-  const Visit& visit = input.at();
-  Eigen::VectorXd course_V(static_cast<Eigen::Index>(visit.count));
-  for (Eigen::Index m = 0; m < course_V.size(); ++m)
-    course_V(m) =
-        input.K_V_per_g *
-        active.effect->sample_term_g(input, active.p.data(), visit.step_s * static_cast<double>(m));
-  return input.log.contrasts.at(visit.count).transpose() * course_V;
+  return input.K_V_per_g * (input.log.contrasts.at(input.at().count).transpose() *
+                            active.effect->course_g(input, active.p.data()));
 }
 
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,

@@ -33,7 +33,7 @@ class MainsPickup final : public Effect {
     const double half = 0.5 * effect::kTurn_rad * p[1] * visit.step_s;
     const double kernel =
         std::abs(std::sin(half)) < 1e-12 ? 1 : std::sin(n * half) / (n * std::sin(half));
-    return kernel * sample_term_g(input, p, 0.5 * (n - 1) * visit.step_s);
+    return kernel * p[0] * std::sin(phase_rad(visit, p) + (n - 1) * half);
   }
   void normalise(std::vector<double>& p) const override {
     if (p[0] < 0) p[2] += 180;
@@ -41,10 +41,15 @@ class MainsPickup final : public Effect {
     p[2] -= 360 * std::floor(p[2] / 360);
   }
   bool within_dwell() const override { return true; }
-  double sample_term_g(const TermInput& input, const double* p,
-                       double since_arrival_s) const override {
-    const double turns = p[1] * (input.at().t_arrival_s + since_arrival_s) + p[2] / 360;
-    return p[0] * std::sin(effect::kTurn_rad * turns);
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
+    const Eigen::ArrayXd since_s = effect::since_arrival_s(input.at());
+    return p[0] * (phase_rad(input.at(), p) + effect::kTurn_rad * p[1] * since_s).sin().matrix();
+  }
+
+ private:
+  /// At the first sample.
+  static double phase_rad(const Visit& visit, const double* p) {
+    return effect::kTurn_rad * (p[1] * visit.t_arrival_s + p[2] / 360);
   }
 };
 

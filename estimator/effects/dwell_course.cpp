@@ -56,15 +56,9 @@ class DwellCourse final : public SmoothTerm {
     return {{std::vector<double>(parameters().size(), effect::kSmallTerm)}};
   }
   double term_g(const TermInput&, const double*) const override { return 0; }
-  double sample_term_g(const TermInput& input, const double* p,
-                       double since_arrival_s) const override {
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
     const Eigen::MatrixXd& table = tables_.at(input.at().count);
-    const double step_s = input.at().step_s;
-    const auto m = step_s > 0 ? std::lround(since_arrival_s / step_s) : 0;
-    double sum = 0;
-    for (int d = 0; d < degree_; ++d)
-      sum += p[d] * table(std::clamp<Eigen::Index>(m, 0, table.rows() - 1), d);
-    return sum * factor(input);
+    return factor(input) * (table * Eigen::Map<const Eigen::VectorXd>(p, table.cols()));
   }
 
  private:

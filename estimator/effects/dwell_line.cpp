@@ -94,6 +94,22 @@ Eigen::ArrayXcd components(const Dwells& dwells, double f_hz) {
   return along_columns(dwells.off_V, dwells.step_s, f_hz) * turning(f_hz, dwells.t_s);
 }
 
+/// Σ |component|² over the columns at 0, 1, 2 … halves of a turn over the length of a column, up
+/// to half the sampling rate.
+Eigen::ArrayXd power_in_bands(const Eigen::MatrixXd& columns, Eigen::FFT<double>& transform) {
+  const auto bands = static_cast<std::size_t>(columns.rows());
+  Eigen::ArrayXd power = Eigen::ArrayXd::Zero(columns.rows() + 1);
+  std::vector<double> padded(2 * bands);
+  std::vector<std::complex<double>> spectrum;
+  for (const auto& column : columns.colwise()) {
+    std::copy(column.begin(), column.end(), padded.begin());
+    transform.fwd(spectrum, padded);
+    for (std::size_t k = 0; k <= bands; ++k)
+      power(static_cast<Eigen::Index>(k)) += std::norm(spectrum[k]);
+  }
+  return power;
+}
+
 /// Share of a sine of this frequency that is left when what is slow within a dwell is removed.
 double share_left(const Dwells& dwells, double f_hz) {
   return 1 - along_columns(dwells.removed, dwells.step_s, f_hz).abs2().sum() /
@@ -177,13 +193,16 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
     double power = 0;
   };
   std::vector<Band> bands;
-  for (double f_hz = 1.5 / dwell_s; f_hz < nyquist_hz * (1 + 1e-9); f_hz += width_hz)
-    bands.push_back({f_hz, components(dwells, f_hz).abs2().sum() / share_left(dwells, f_hz)});
+  Eigen::FFT<double> transform;
+  const Eigen::ArrayXd power_V2 = power_in_bands(dwells.off_V, transform);
+  const Eigen::ArrayXd removed = power_in_bands(dwells.removed, transform);
+  for (Eigen::Index k = 3; k < power_V2.size(); ++k)
+    bands.push_back({width_hz * static_cast<double>(k),
+                     power_V2(k) / (1 - removed(k) / static_cast<double>(longest))});
   const std::size_t looked_at = std::min(kStrongest, bands.size());
   std::partial_sort(bands.begin(), bands.begin() + static_cast<std::ptrdiff_t>(looked_at),
                     bands.end(), [](const Band& a, const Band& b) { return a.power > b.power; });
 
-  Eigen::FFT<double> transform;
   double best_hz = 0, best_power = 0;
   for (std::size_t k = 0; k < looked_at; ++k) {
     const double f_hz = best_frequency(dwells, bands[k].f_hz, width_hz, transform);

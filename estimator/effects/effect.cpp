@@ -10,8 +10,8 @@ void Effect::displace(const VisitLog&, std::size_t, const double*, HeadGeometry&
 
 double Effect::term_g(const TermInput&, const double*) const { return 0; }
 
-double Effect::sample_term_g(const TermInput& input, const double* p, double) const {
-  return term_g(input, p);
+Eigen::VectorXd Effect::course_g(const TermInput& input, const double* p) const {
+  return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(input.at().count), term_g(input, p));
 }
 
 namespace effect {
@@ -19,6 +19,11 @@ namespace effect {
 double share_below(double edge, double value, double sd) {
   if (!(sd > 0)) return value < edge ? 1 : 0;
   return normal_below((edge - value) / sd);
+}
+
+Eigen::ArrayXd since_arrival_s(const Visit& visit) {
+  const auto last = static_cast<Eigen::Index>(visit.count) - 1;
+  return visit.step_s * Eigen::ArrayXd::LinSpaced(last + 1, 0, static_cast<double>(last));
 }
 
 double mean_decay(const Visit& visit, double origin_s, double tau_s) {

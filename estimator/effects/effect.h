@@ -80,11 +80,10 @@ class Effect {
                         HeadGeometry& head) const;
   /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
   virtual double term_g(const TermInput& input, const double* p) const;
-  /// Whether the term changes while the head rests; sample_term_g() says how.
+  /// Whether the term changes while the head rests; course_g() says how.
   virtual bool within_dwell() const { return false; }
-  /// Sensor: the term `since_arrival_s` after the first sample of the visit, g.
-  virtual double sample_term_g(const TermInput& input, const double* p,
-                               double since_arrival_s) const;
+  /// Sensor: the term at every sample of the visit, g.
+  virtual Eigen::VectorXd course_g(const TermInput& input, const double* p) const;
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&) const { return false; }
   /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.
@@ -113,6 +112,8 @@ inline constexpr std::size_t kPartsOfDwell = 8;
 inline constexpr double kSmallTerm = 1e-3;
 inline constexpr double kSmallAngle_deg = 0.02;
 
+/// Times of the samples of the visit from the first on.
+Eigen::ArrayXd since_arrival_s(const Visit& visit);
 /// Mean over the dwell of exp(−(t − origin)/τ), in closed form for even spacing.
 double mean_decay(const Visit& visit, double origin_s, double tau_s);
 /// `count` values from `first` to `last` in equal ratios.

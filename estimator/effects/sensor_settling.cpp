@@ -27,9 +27,8 @@ class Settling final : public Effect {
     return p[0] * came_from_g(input) * effect::mean_decay(input.at(), input.at().t_arrival_s, p[1]);
   }
   bool within_dwell() const override { return true; }
-  double sample_term_g(const TermInput& input, const double* p,
-                       double since_arrival_s) const override {
-    return p[0] * came_from_g(input) * std::exp(-since_arrival_s / p[1]);
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
+    return p[0] * came_from_g(input) * (-effect::since_arrival_s(input.at()) / p[1]).exp().matrix();
   }
 
  private:

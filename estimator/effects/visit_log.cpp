@@ -164,7 +164,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     for (std::size_t i = 0; i < kAxisCount; ++i) visit.mean_V[i] = mean_of(samples.u_V[i], pose);
     log.visits.push_back(std::move(visit));
   }
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
+  parallel_for(kAxisCount, [&](std::size_t i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
     if (log.adc) {
       log.codes[i] = code_faults(set, i, *log.adc);
@@ -174,8 +174,8 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
-  }
-  parallel_for(kAxisCount, [&](std::size_t i) { log.line[i] = line_through_dwells(set, i); });
+    log.line[i] = line_through_dwells(set, i);
+  });
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))
       log.contrasts.emplace(visit.count, contrasts_of(visit, log.line));

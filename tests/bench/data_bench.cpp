@@ -86,14 +86,14 @@ BENCHMARK(csv_read)
     ->UseRealTime();
 
 constexpr int kPoses = 100;
-constexpr int kSamples = 100;
+constexpr int kReadings = 100;
 
 storage::PoseRecord pose_of(long long ordinal) {
   storage::PoseRecord pose;
   pose.ordinal = ordinal;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < kReadings; ++i) {
     RawSample sample;
-    sample.counter = ordinal * kSamples + i;
+    sample.counter = ordinal * kReadings + i;
     sample.t_s = 10.0 * static_cast<double>(ordinal) + 0.01 * i;
     sample.code = {i, -i, 7};
     sample.temp_C = 20;
@@ -104,7 +104,7 @@ storage::PoseRecord pose_of(long long ordinal) {
 
 void store_limit(benchmark::State& state) {
   const fs::path file = folder() / "plain.bin";
-  const std::string bytes(kSamples * 32, 'x');
+  const std::string bytes(kReadings * 32, 'x');
   for (auto _ : state) {
     const int handle = ::open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
     for (int pose = 0; pose < kPoses; ++pose) {
