@@ -235,12 +235,12 @@ class Search {
       return std::count(dropped_.begin(), dropped_.end(), c.family) == 0 && !is_chosen(c);
     };
     const auto found = look_among_slow(input_, list_, stage_, noise_is_own_,
-                                       {beside, axes, worth_a_look, is_open});
+                                       {beside, axes, worth_a_look, options_.false_alarm_of_slow,
+                                        is_open});
     if (!found) return false;
-    const double p = p_of_search(found->log_p, found->looks);
-    p_best_rest_ = std::min(p_best_rest_, p);
-    if (p > options_.false_alarm_of_slow || !adopt(found->model)) return false;
-    choose(found->candidate, p);
+    p_best_rest_ = std::min(p_best_rest_, found->p_value);
+    if (found->p_value > options_.false_alarm_of_slow || !adopt(found->model)) return false;
+    choose(found->candidate, found->p_value);
     return true;
   }
 

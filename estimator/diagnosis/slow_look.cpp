@@ -75,7 +75,7 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
     stages[k] = settle(input, with_effect(model, candidate.active()), compared);
   });
   std::optional<SlowFinding> best;
-  double best_score = std::numeric_limits<double>::infinity();
+  std::pair best_score{true, std::numeric_limits<double>::infinity()};
   for (std::size_t k = 0; k < stages.size(); ++k) {
     const Candidate& candidate = list.candidates[ranked[k].candidate];
     Stage& with = stages[k];
@@ -83,12 +83,13 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
     const double gain =
         plain[candidate.axis].likelihood_deviance - with.noise[candidate.axis].likelihood_deviance;
     const double log_p = log_chi_squared_tail(gain, gains.dof(ranked[k].candidate));
-    const double score = log_p + (ranked[k].score - ranked[k].log_p);
+    // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
+    const double p_value =
+        p_of_search(log_p, static_cast<double>(ranked.size() * list.family_size[candidate.family]));
+    const std::pair score{p_value > look.false_alarm, log_p + (ranked[k].score - ranked[k].log_p)};
     if (score >= best_score) continue;
     best_score = score;
-    // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
-    best = {ranked[k].candidate, std::move(with.fit.parameters), log_p,
-            static_cast<double>(ranked.size() * list.family_size[candidate.family])};
+    best = {ranked[k].candidate, std::move(with.fit.parameters), p_value};
   }
   return best;
 }

@@ -16,6 +16,7 @@ struct SlowLook {
   PerAxis<bool> axes;
   /// An axis is looked at when all of `beside` together has a smaller p-value; 1: always.
   double worth_a_look;
+  double false_alarm;  ///< p-value of the look below which a candidate counts as significant
   std::function<bool(const Candidate&)> is_open;  ///< whether a candidate may join the model
 };
 
@@ -23,12 +24,12 @@ struct SlowLook {
 struct SlowFinding {
   std::size_t candidate = 0;
   EnlargedParameters model;  ///< with it, fitted
-  double log_p = 0;          ///< of its own
-  double looks = 1;          ///< that were taken
+  double p_value = 1;        ///< of the look as a whole
 };
 
 /// The noise is estimated once more, beside all that is slow, and the candidates are compared by
-/// the likelihood of each with its own noise. `noise_is_own`: the noise of `stage` was estimated
+/// the likelihood of each with its own noise; what is not significant comes behind what is, however
+/// well known its name. `noise_is_own`: the noise of `stage` was estimated
 /// beside its model and nothing else. Empty when nothing was worth a look or is determined.
 std::optional<SlowFinding> look_among_slow(const SearchInput& input, const CandidateList& list,
                                            const Stage& stage, bool noise_is_own,
