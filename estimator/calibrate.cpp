@@ -123,6 +123,15 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
   return variance;
 }
 
+/// The covariance of estimates under noise V, the powers of the noise being estimates, too.
+Eigen::Matrix4d with_allowance_for_noise(const Experiment& experiment, const AxisWork& work,
+                                         const Eigen::MatrixXd& V, const Eigen::Matrix4d& C) {
+  const EstimatedPowers powers{work.pooled.power, work.test.present, work.test.information,
+                               work.test.gain_of_slow};
+  return with_allowance(C,
+                        {allowance_for_powers(experiment.processes, powers, V, experiment.A, C)});
+}
+
 /// Estimates from the codes where rounding matters.
 void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   if (!experiment.input.description.adc) return;
@@ -143,7 +152,8 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   V.diagonal() += quantized->variance_V2;
   const auto fit = fit_generalised(experiment.A, quantized->mean_V, V);
   if (!fit) return;
-  work.fit.estimate = fit->estimate;
+  work.fit.estimate = {fit->estimate.value,
+                       with_allowance_for_noise(experiment, work, V, fit->estimate.covariance)};
   work.fit.whitened = fit->whitened;
   work.fit.gain = fit->gain;
   work.fit.residual_V = work.y - experiment.A * fit->estimate.value;
@@ -155,15 +165,6 @@ bool rounded_as_declared(const CalibrationInput& input, std::size_t axis) {
   if (!adc) return true;
   const CodeFaults faults = code_faults(input.run, axis, *adc);
   return faults.stuck_bits.empty() && !faults.coarser_lattice;
-}
-
-/// What the covariance lacks since the powers of the noise are estimates, too.
-Eigen::Matrix4d allowance_for_noise(const Experiment& experiment, const AxisWork& work) {
-  const Eigen::Matrix4d& C = work.fit.estimate.covariance;
-  return 2 * C *
-         allowance_for_powers(experiment.processes, work.test.present, work.test.information,
-                              work.V, experiment.A, C) *
-         C;
 }
 
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {
@@ -217,9 +218,9 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
     work.fit = *fit;
     work.noise_known = known;
-    const Eigen::Matrix4d allowance = allowance_for_noise(experiment, work);
+    work.fit.estimate.covariance =
+        with_allowance_for_noise(experiment, work, work.V, fit->estimate.covariance);
     use_codes(experiment, axis, work);
-    work.fit.estimate.covariance += allowance;
     return work;
   }
   // Nothing is known about the noise: the residual has to say how large it is.

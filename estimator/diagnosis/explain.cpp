@@ -196,15 +196,16 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   if (found.evidence.size() != before_dropping)
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
   if (found.evidence.empty()) return without_effects();
+  // Leaving out and the expected residual want the covariance under the noise that was used.
+  const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
-  found.fit.covariance += allowance_for_noise(search, found, jacobian);
+  found.fit.covariance = with_allowance_for_noise(search, found, jacobian);
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);
 
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
-  const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
   EnlargedParameters bare = found.fit.parameters;
   bare.effects.clear();
   const auto twelve_V = predict_means_V(log, bare);

@@ -164,22 +164,25 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters, con
   return stage;
 }
 
-Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found,
-                                    const Eigen::MatrixXd& jacobian) {
+Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchResult& found,
+                                         const Eigen::MatrixXd& jacobian) {
   const Eigen::MatrixXd& C = found.fit.covariance;
   const auto n = std::ssize(input.log.visits);
-  PerAxis<Eigen::MatrixXd> of_axis;
+  const auto predicted = predict_means_V(input.log, found.fit.parameters);
+  std::vector<PowersAllowance> of_axis(kAxisCount);
   parallel_for(kAxisCount, [&](std::size_t i) {
     const Eigen::MatrixXd X = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     const PooledNoise& noise = found.noise[i];
     const std::vector<Eigen::Index> present = noise.present();
     const NoisePool pool(input.processes, record_of(input, i, found.coarse[i]), found.own_V2[i]);
-    const Eigen::MatrixXd information = pool.information_of(
-        noise.power, make_projector(noise.covariance, independent_columns(X)).P, present);
-    of_axis[i] =
-        allowance_for_powers(input.processes, present, information, noise.covariance, X, C);
+    const Eigen::MatrixXd design = independent_columns(X);
+    const EstimatedPowers powers{
+        noise.power, present,
+        pool.information_of(noise.power, make_projector(noise.covariance, design).P, present),
+        pool.gain_of_slow_noise(noise, found.observed.mean_V[i] - predicted[i], design)};
+    of_axis[i] = allowance_for_powers(input.processes, powers, noise.covariance, X, C);
   });
-  return 2 * C * (of_axis[0] + of_axis[1] + of_axis[2]) * C;
+  return with_allowance(C, of_axis);
 }
 
 namespace {

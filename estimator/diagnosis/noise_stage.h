@@ -39,10 +39,10 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
 /// after the parameters are known settles both.
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters, const Before& before);
 
-/// What the covariance of the parameters of `found` lacks since the powers of its noise are
-/// estimates, too: allowance_for_powers() of all axes. `jacobian`: prediction_jacobian() there.
-Eigen::MatrixXd allowance_for_noise(const SearchInput& input, const SearchResult& found,
-                                    const Eigen::MatrixXd& jacobian);
+/// The covariance of the parameters of `found`, the powers of its noise being estimates, too:
+/// with_allowance() of all axes. `jacobian`: prediction_jacobian() there.
+Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchResult& found,
+                                         const Eigen::MatrixXd& jacobian);
 
 /// What changes slowly and could pass for slow noise: the time to the second order, powers of the
 /// height of the spindle where the order of the poses makes that slow, and what was

@@ -173,6 +173,7 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
   full << input.design, functions;
   const bool enough = n >= input.design.cols() + 3 * functions.cols();
   const NoisePool pool(input.processes, noise, input.extra_variance);
+  const Eigen::MatrixXd* beside = &input.design;
   Judgement judged =
       judge(pool, pool.pool(y, input.design), y, input.design, functions, input.design.cols());
   ResidualTestResult result;
@@ -182,10 +183,14 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
     Judgement rich = judge(pool, pool.pool(y, full, &judged.noise.power), y, input.design,
                            functions, full.cols());
     result.p_structure = merged(judged.p_structure, rich.p_structure);
-    if (result.p_structure < kStructureSeen) judged = std::move(rich);
+    if (result.p_structure < kStructureSeen) {
+      judged = std::move(rich);
+      beside = &full;
+    }
   }
   result.present = judged.noise.present();
   result.information = pool.information_of(judged.noise.power, judged.P, result.present);
+  result.gain_of_slow = pool.gain_of_slow_noise(judged.noise, y, *beside);
   result.noise = std::move(judged.noise);
   result.chi2 = judged.chi2;
   result.dof = static_cast<double>(n - input.design.cols());

@@ -35,6 +35,7 @@ struct ResidualTestResult {
   PooledNoise noise;                  ///< noise powers under "no effect", and the Σ that was used
   std::vector<Eigen::Index> present;  ///< the powers that are not zero
   Eigen::MatrixXd information;        ///< about those, the others held at zero
+  double gain_of_slow = 0;            ///< of −2 ln L, by the slow ones among them
 };
 
 /// Pose means of temperature and covariates, n×k, for ResidualTestInput::drivers; a quantity that

@@ -234,9 +234,9 @@ class Search {
     const auto is_open = [&](const Candidate& c) {
       return std::count(dropped_.begin(), dropped_.end(), c.family) == 0 && !is_chosen(c);
     };
-    const auto found = look_among_slow(input_, list_, stage_, noise_is_own_,
-                                       {beside, axes, worth_a_look, options_.false_alarm_of_slow,
-                                        is_open});
+    const auto found =
+        look_among_slow(input_, list_, stage_, noise_is_own_,
+                        {beside, axes, worth_a_look, options_.false_alarm_of_slow, is_open});
     if (!found) return false;
     p_best_rest_ = std::min(p_best_rest_, found->p_value);
     if (found->p_value > options_.false_alarm_of_slow || !adopt(found->model)) return false;
@@ -356,6 +356,7 @@ class Search {
                       const std::vector<std::vector<double>>& p) {
     const Candidate& repeated = list_.candidates[chosen_[instances.front()]];
     const EnlargedFit without = fit_without(instances);
+    if (!without.determined) return false;
     const Effect* tried = nullptr;
     std::optional<Exchange> best;
     double best_cost = stage_.fit.chi2 + price_of(instances);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "estimator/linear_algebra.h"
@@ -15,7 +16,16 @@ namespace plumbline {
 
 namespace {
 
-constexpr double kMarkovRatio = 4;  // of neighbouring correlation times
+constexpr Eigen::Index kFirstSlow = kTermB;  // among the processes
+constexpr double kMarkovRatio = 4;           // of neighbouring correlation times
+
+/// Looks at the lower triangle only.
+bool has_diagonal_only(const Eigen::MatrixXd& covariance) {
+  for (Eigen::Index column = 0; column < covariance.cols(); ++column)
+    if ((covariance.col(column).tail(covariance.rows() - column - 1).array() != 0).any())
+      return false;
+  return true;
+}
 
 double duration_s(const SampleWindow& window) {
   return window.step_s * static_cast<double>(window.count);
@@ -63,15 +73,23 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
 }
 
 Projector make_projector(Eigen::MatrixXd covariance, const Eigen::MatrixXd& design) {
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> cholesky(covariance);
-  assert(cholesky.info() == Eigen::Success);
-  const Eigen::MatrixXd white_design = cholesky.matrixL().solve(design);
-  const Eigen::LLT<Eigen::MatrixXd> normal(white_design.transpose() * white_design);
   Projector result;
+  Eigen::MatrixXd white_design;
+  if (has_diagonal_only(covariance)) {
+    const Eigen::VectorXd variance = covariance.diagonal();
+    result.log_determinant = variance.array().log().sum();
+    white_design = variance.cwiseSqrt().cwiseInverse().asDiagonal() * design;
+    result.P = variance.cwiseInverse().asDiagonal();
+  } else {
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> cholesky(covariance);
+    assert(cholesky.info() == Eigen::Success);
+    result.log_determinant = 2 * covariance.diagonal().array().log().sum();
+    white_design = cholesky.matrixL().solve(design);
+    result.P = inverse_from_factor(std::move(covariance));
+  }
+  const Eigen::LLT<Eigen::MatrixXd> normal(white_design.transpose() * white_design);
   result.log_determinant_of_design = 2 * normal.matrixLLT().diagonal().array().log().sum();
-  result.log_determinant =
-      2 * covariance.diagonal().array().log().sum() + result.log_determinant_of_design;
-  result.P = inverse_from_factor(std::move(covariance));
+  result.log_determinant += result.log_determinant_of_design;
   const Eigen::MatrixXd weighted = result.P * design;
   result.P.noalias() -= weighted * normal.solve(weighted.transpose());
   return result;
@@ -268,21 +286,10 @@ std::vector<Eigen::Index> PooledNoise::present() const {
   return found;
 }
 
-Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
-                                     const std::vector<Eigen::Index>& present,
-                                     const Eigen::MatrixXd& information, const Eigen::MatrixXd& V,
-                                     const Eigen::MatrixXd& X, const Eigen::MatrixXd& C) {
-  if (present.empty()) return Eigen::MatrixXd::Zero(C.rows(), C.cols());
-  const Eigen::LLT<Eigen::MatrixXd> factor(V);
-  const Eigen::MatrixXd B = factor.solve(X);
-  const auto count = std::ssize(present);
-  std::vector<Eigen::MatrixXd> P, Z;  // −∂(X'V⁻¹X) by each power; L⁻¹ times what it does to B
-  for (const Eigen::Index i : present) {
-    const Eigen::MatrixXd moved = processes.unit[static_cast<std::size_t>(i)] * B;
-    P.emplace_back(B.transpose() * moved);
-    Z.emplace_back(factor.matrixL().solve(moved));
-  }
-  // In units of the powers' own uncertainties; what is not determined at all is left out.
+namespace {
+
+/// Of a matrix that may not determine everything: what is not determined is left out.
+Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
   constexpr double kDetermined = 1e-6;
   const Eigen::VectorXd scale = information.diagonal().unaryExpr(
       [](double value) { return value > 0 ? 1 / std::sqrt(value) : 0; });
@@ -290,15 +297,65 @@ Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
                                                              scale.asDiagonal());
   Eigen::VectorXd inverse = eigen.eigenvalues();
   for (double& value : inverse) value = value > kDetermined ? 1 / value : 0;
-  const Eigen::MatrixXd W = scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
-                            eigen.eigenvectors().transpose() * scale.asDiagonal();
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
-  for (Eigen::Index i = 0; i < count; ++i)
+  return scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
+         eigen.eigenvectors().transpose() * scale.asDiagonal();
+}
+
+/// Probability that there is slow noise at all: the odds by likelihood against a price for what
+/// powers that cannot be negative gain by chance.
+double probability_of_slow_noise(double gain) {
+  constexpr double kPrice = 5;  // of −2 ln L: in white noise the gain exceeds it one time in 20
+  return 1 / (1 + std::exp(0.5 * (kPrice - gain)));
+}
+
+}  // namespace
+
+PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const EstimatedPowers& powers,
+                                     const Eigen::MatrixXd& V, const Eigen::MatrixXd& X,
+                                     const Eigen::MatrixXd& C) {
+  const Eigen::Index p = C.rows();
+  PowersAllowance result{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
+  if (powers.present.empty()) return result;
+  const Eigen::LLT<Eigen::MatrixXd> factor(V);
+  const Eigen::MatrixXd B = factor.solve(X);
+  const auto count = std::ssize(powers.present);
+  std::vector<Eigen::MatrixXd> P, Z;  // −∂(X'V⁻¹X) by each power; L⁻¹ times what it does to B
+  Eigen::MatrixXd slope(p, count);  // of the diagonal of C
+  for (const Eigen::Index i : powers.present) {
+    const Eigen::MatrixXd moved = processes.unit[static_cast<std::size_t>(i)] * B;
+    slope.col(std::ssize(P)) = (C * (B.transpose() * moved) * C).diagonal();
+    P.emplace_back(B.transpose() * moved);
+    Z.emplace_back(factor.matrixL().solve(moved));
+  }
+  const Eigen::MatrixXd W = inverse_of_information(powers.information);
+  const double slow = probability_of_slow_noise(powers.gain_of_slow);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto a = static_cast<std::size_t>(i);
+    const Eigen::Index process = powers.present[a];
+    if (process >= kFirstSlow) result.M -= (1 - slow) * powers.power(process) * P[a];
     for (Eigen::Index j = 0; j < count; ++j) {
-      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
-      M += W(i, j) * (Z[a].transpose() * Z[b] - P[a] * C * P[b]);
+      const auto b = static_cast<std::size_t>(j);
+      result.M += 2 * slow * W(i, j) * (Z[a].transpose() * Z[b] - P[a] * C * P[b]);
     }
-  return M;
+  }
+  result.variance = slow * slow * (slope * W).cwiseProduct(slope).rowwise().sum();
+  return result;
+}
+
+Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
+                               const std::vector<PowersAllowance>& allowances) {
+  constexpr double kFewest = 4;  // degrees of freedom; of fewer hardly anything is known
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(C.rows());
+  for (const PowersAllowance& allowance : allowances) {
+    M += allowance.M;
+    variance += allowance.variance;
+  }
+  const Eigen::VectorXd wider =
+      (2 * C.diagonal().array().square() / variance.array().max(1e-300))
+          .max(kFewest)
+          .unaryExpr([](double dof) { return std::sqrt(dof / (dof - 2)); });
+  return wider.asDiagonal() * (C + C * M * C) * wider.asDiagonal();
 }
 
 Eigen::VectorXd NoisePool::starting_powers() const {
@@ -318,8 +375,6 @@ Eigen::VectorXd NoisePool::starting_powers() const {
 
 PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                             const Eigen::VectorXd* start) const {
-  constexpr int kIterations = 60;
-  constexpr double kEnough = 1e-2;  // of −2 ln L: far below anything a test can feel
   assert(mean.size() == design.rows() && mean.size() > design.cols());
   // The means cannot tell quantization from white noise: without a record it stays at zero.
   std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
@@ -328,6 +383,24 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
   if (!free[kTermQ]) first(kTermQ) = 0;
   // Powers that were found to be zero need a little to find the way back.
   if (start != nullptr) first = start->cwiseMax(0.02 * first);
+  return climb(first, free, mean, design);
+}
+
+double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
+                                     const Eigen::MatrixXd& design) const {
+  Eigen::VectorXd first = found.power;
+  first.tail(first.size() - kFirstSlow).setZero();
+  if (first.sum() <= 0 && !own_noise_) return std::numeric_limits<double>::infinity();
+  std::vector<bool> free(static_cast<std::size_t>(first.size()), false);
+  free[kTermQ] = densities_.size() > 0;
+  free[kTermN] = true;
+  return climb(first, free, mean, design).deviance - found.deviance;
+}
+
+PooledNoise NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+                             const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const {
+  constexpr int kIterations = 60;
+  constexpr double kEnough = 1e-2;  // of −2 ln L: far below anything a test can feel
   PooledNoise result;
   Point now = evaluate(first, mean, design);
   for (int iteration = 0; iteration < kIterations && !result.converged; ++iteration) {

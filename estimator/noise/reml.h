@@ -51,6 +51,10 @@ class NoisePool {
   /// mean: n; design: n×p of full rank, n > p. `start`: powers to begin with, or null.
   PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                    const Eigen::VectorXd* start = nullptr) const;
+  /// By how much −2 ln of the restricted likelihood is better with the slow processes of `found`,
+  /// which pool() found for the same mean and design, than without any.
+  double gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
+                            const Eigen::MatrixXd& design) const;
   /// Expected information of both sources about the `wanted` powers, the others held, where the
   /// powers are `power` and P is the projector of their Σ and of the design.
   Eigen::MatrixXd information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
@@ -69,6 +73,9 @@ class NoisePool {
   Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                  const Eigen::MatrixXd& design) const;
   Eigen::VectorXd starting_powers() const;
+  /// pool() from powers to begin with and with which of them are free.
+  PooledNoise climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
 
   const NoiseProcesses* processes_;
   NoiseModel model_;
@@ -85,14 +92,31 @@ NoiseModel without_record(NoiseModel model);
 NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
                            const PooledNoise& pooled, double span_s);
 
-/// What the covariance C (p×p) of generalised least-squares estimates of the design X (n×p) lacks
-/// since the powers of the noise, of which those of the processes `present` have this information,
-/// were themselves estimated: the allowance is 2·C·M·C, and M is returned (Kenward & Roger,
-/// Biometrics 53, 1997, eq. 5). Several records of independent noise add their M.
-Eigen::MatrixXd allowance_for_powers(const NoiseProcesses& processes,
-                                     const std::vector<Eigen::Index>& present,
-                                     const Eigen::MatrixXd& information, const Eigen::MatrixXd& V,
-                                     const Eigen::MatrixXd& X, const Eigen::MatrixXd& C);
+/// Powers that were estimated, with what is known of those `present`.
+struct EstimatedPowers {
+  const Eigen::VectorXd& power;
+  std::vector<Eigen::Index> present;
+  Eigen::MatrixXd information;  ///< as information_of() gives it
+  double gain_of_slow = 0;      ///< as gain_of_slow_noise() gives it
+};
+
+/// What one record adds to the knowledge that the powers of its noise are estimates. p parameters.
+struct PowersAllowance {
+  Eigen::MatrixXd M;         ///< p×p: the covariance C becomes C + C·M·C
+  Eigen::VectorXd variance;  ///< p, of the diagonal of C
+};
+/// Of generalised least-squares estimates of the design X (n×p) with covariance C under noise of
+/// covariance V. M holds the scatter of the weights (Kenward & Roger, Biometrics 53, 1997, eq. 5)
+/// and takes off slow noise as far as it may not be there at all: powers cannot be negative, so
+/// estimates of none are too large as often as not.
+PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const EstimatedPowers& powers,
+                                     const Eigen::MatrixXd& V, const Eigen::MatrixXd& X,
+                                     const Eigen::MatrixXd& C);
+/// C with the allowances of all records, whose noise is independent, and every standard uncertainty
+/// with that of Student's t for its degrees of freedom ν = 2·C²/var C, by √(ν/(ν − 2))
+/// (Satterthwaite; JCGM 101:2008, 6.4.9.4).
+Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
+                               const std::vector<PowersAllowance>& allowances);
 
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cstring>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "rig/sim/descriptor.h"
@@ -133,7 +134,7 @@ class SocketCanOutput final : public FrameOutput {
       if (!gone && errno != ENOBUFS && errno != EAGAIN && errno != EINTR && errno != ENETDOWN) {
         return fail(ErrorCode::rig, fmt::format("{}: cannot send: {}", endpoint_, reason()));
       }
-      if (gone && open()) continue;
+      if (gone) std::ignore = open();  // tried by the next write, here or of the next frame
       if (stuck_ || std::chrono::steady_clock::now() >= until) {
         stuck_ = true;
         ++dropped_;

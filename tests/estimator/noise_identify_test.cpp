@@ -256,15 +256,43 @@ TEST(AllowanceForPowers, OnePowerScalesEverythingAndMovesNothing) {
   const NoiseProcesses processes = noise_processes(run.windows);
   const Eigen::MatrixXd V = 1e-8 * processes.unit[kTermK] + 1e-8 * processes.unit[kTermN];
   NoiseProcesses one = processes;
-  one.unit[kTermN] = V;
+  one.unit[kTermK] = V;
   const Eigen::MatrixXd C =
       (run.design.transpose() * V.llt().solve(run.design)).llt().solve(Eigen::Matrix4d::Identity());
-  const Eigen::MatrixXd M =
-      allowance_for_powers(one, {kTermN}, Eigen::MatrixXd::Constant(1, 1, 50), V, run.design, C);
-  EXPECT_LT((C * M * C).norm(), 1e-9 * C.norm());
-  const Eigen::MatrixXd nothing =
-      allowance_for_powers(one, {}, Eigen::MatrixXd(0, 0), V, run.design, C);
-  EXPECT_EQ(nothing, Eigen::MatrixXd::Zero(4, 4)) << "noise that is known needs none";
+  const Eigen::VectorXd power = Eigen::VectorXd::Unit(one.count(), kTermK);
+  // The power is 1 with a standard deviation of 0.2: 50 degrees of freedom.
+  const PowersAllowance allowance = allowance_for_powers(
+      one, {power, {kTermK}, Eigen::MatrixXd::Constant(1, 1, 25), 1e3}, V, run.design, C);
+  EXPECT_LT((C * allowance.M * C).norm(), 1e-4 * C.norm());
+  EXPECT_LT((with_allowance(C, {allowance}) - C * 50 / 48).norm(), 1e-3 * C.norm());
+  const PowersAllowance nothing =
+      allowance_for_powers(one, {power, {}, Eigen::MatrixXd(0, 0), 0}, V, run.design, C);
+  EXPECT_EQ(with_allowance(C, {nothing}), C) << "noise that is known needs none";
+}
+
+TEST(AllowanceForPowers, SlowNoiseThatMayNotBeThereCountsAsFarAsItIsLikely) {
+  const SmallRun run = make_run(1, 0);
+  const NoiseProcesses processes = noise_processes(run.windows);
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(processes.count());
+  power(kTermN) = power(kTermK) = 1e-8;
+  const auto covariance_under = [&](const Eigen::MatrixXd& V) -> Eigen::Matrix4d {
+    return (run.design.transpose() * V.llt().solve(run.design))
+        .llt()
+        .solve(Eigen::Matrix4d::Identity());
+  };
+  const Eigen::MatrixXd white_V = 1e-8 * processes.unit[kTermN];
+  const Eigen::MatrixXd V = white_V + 1e-8 * processes.unit[kTermK];
+  const Eigen::Matrix4d C = covariance_under(V);
+  Eigen::MatrixXd information = Eigen::Matrix2d::Zero();
+  information.diagonal() << 1e20, 1e18;
+  const auto variance_at_gain = [&](double gain) {
+    const EstimatedPowers powers{power, {kTermN, kTermK}, information, gain};
+    return with_allowance(C, {allowance_for_powers(processes, powers, V, run.design, C)})(2, 2);
+  };
+  const double white = covariance_under(white_V)(2, 2);
+  EXPECT_GT(variance_at_gain(0), white);
+  EXPECT_LT(variance_at_gain(0), 0.5 * C(2, 2));
+  EXPECT_GT(variance_at_gain(30), C(2, 2));
 }
 
 // K_z hangs on what changes slowly, and a few slow noise values say little of their own variance.
@@ -284,12 +312,14 @@ TEST(AllowanceForPowers, EstimatesScatterAsWidelyAsItSays) {
     const std::vector<Eigen::Index> present = noise.present();
     const Eigen::MatrixXd information =
         pool.information_of(noise.power, make_projector(noise.covariance, run.design).P, present);
-    const Eigen::Matrix4d allowance =
-        2 * C *
-        allowance_for_powers(processes, present, information, noise.covariance, run.design, C) * C;
-    EXPECT_GE(allowance.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-9 * C.norm());
+    const Eigen::Matrix4d with = with_allowance(
+        C, {allowance_for_powers(processes,
+                                 {noise.power, present, information,
+                                  pool.gain_of_slow_noise(noise, run.mean, run.design)},
+                                 noise.covariance, run.design, C)});
+    EXPECT_GT(with.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0);
     plain += x(2) * x(2) / C(2, 2) / kRuns;
-    allowed += x(2) * x(2) / (C(2, 2) + allowance(2, 2)) / kRuns;
+    allowed += x(2) * x(2) / with(2, 2) / kRuns;
   }
   EXPECT_GT(plain, allowed);
   EXPECT_NEAR(allowed, 1, 0.35) << "without: " << plain;
