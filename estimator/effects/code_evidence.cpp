@@ -168,30 +168,45 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
     }
     return Fit{};
   };
-  // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
-  // enough to be told from chance.
-  double first = 0, last = 0;
-  double tried = std::min(kCoarsest, (range + 1) / 4);
-  while (tried > kFinest) {
-    if (fit(tried).good) {
-      if (first == 0) first = tried;
-      last = tried;
-    } else if (first > 0) {
-      break;
+  /// Neighbouring steps that fit.
+  struct Steps {
+    double first = 0, last = 0;
+    double least_spread = 0;
+  };
+  const auto steps_below = [&](double& tried, double finest) {
+    Steps steps;
+    for (; tried > finest; tried *= 1 - resolution / 3) {
+      if (fit(tried).good) {
+        if (steps.first == 0) steps.first = tried;
+        steps.last = tried;
+      } else if (steps.first > 0) {
+        break;
+      }
     }
-    tried *= 1 - resolution;
+    steps.least_spread = tolerance;
+    constexpr int kCloser = 64;
+    for (int k = 0; k <= kCloser && steps.first > 0; ++k) {
+      const Fit closer = fit(steps.first + (steps.last - steps.first) * k / kCloser);
+      if (closer.good) steps.least_spread = std::min(steps.least_spread, closer.spread);
+    }
+    return steps;
+  };
+  // Every lattice point is rounded to one code; codes a whole declared step apart are two for one.
+  const auto is_exact = [](const Steps& steps) { return steps.least_spread < 1 - 1e-9; };
+  // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
+  // enough to be told from chance. Next to the true step a simple ratio may fit almost as well.
+  double tried = std::min(kCoarsest, (range + 1) / 4);
+  Steps found = steps_below(tried, kFinest);
+  if (found.first == 0) return {};
+  const double no_part = std::max(kFinest, found.first / 1.5);
+  while (!is_exact(found) && tried > no_part) {
+    const Steps next = steps_below(tried, no_part);
+    if (next.first > 0 && is_exact(next)) found = next;
   }
-  if (first == 0) return {};
-  double least_spread = tolerance;
-  constexpr int kCloser = 64;
-  for (int k = 0; k <= kCloser; ++k) {
-    const Fit closer = fit(first + (last - first) * k / kCloser);
-    if (closer.good) least_spread = std::min(least_spread, closer.spread);
-  }
-  // Of all sets of so many codes within the range, those that lie on one of the lattices. Every
-  // point is rounded to one code, which changes for some point whenever the origin moves a little;
-  // codes that are a whole step of the declared converter apart would be two for one point.
-  const double allowed = least_spread < 1 - 1e-9 ? 1 : 2;
+  const double first = found.first, last = found.last;
+  // Of all sets of so many codes within the range, those that lie on one of the lattices. The code
+  // of a point changes for some point whenever the origin moves a little.
+  const double allowed = is_exact(found) ? 1 : 2;
   const double step = 0.5 * (first + last);
   const double seen = static_cast<double>(codes.size());
   const double points = std::max(seen, std::floor(range / step) + 1);
