@@ -15,7 +15,9 @@ namespace {
 
 constexpr std::size_t kFewestSamples = 8;
 constexpr Eigen::Index kFewestDwells = 10;
-constexpr double kFalseAlarm = 1e-5;
+// The search that follows counts the line as one candidate, whose frequency was not looked for, and
+// real lines are beyond doubt in thousands of readings.
+constexpr double kFalseAlarm = 1e-8;
 
 /// All dwells of one axis, side by side.
 struct Dwells {

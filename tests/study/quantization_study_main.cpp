@@ -37,7 +37,8 @@ int main(int argc, char** argv) {
   int trials = 150;
   std::uint64_t seed = 1;
   CLI::App app{"Error of the parameters, RMS over the sphere, where converter steps are coarse"};
-  app.add_option("trials", trials, "simulated units of each kind")
+  app.add_option("trials", trials,
+                 "simulated units of each kind; four times as many where an error is demanded")
       ->check(CLI::Range(2, 1000000))
       ->capture_default_str();
   app.add_option("--seed", seed, "of the first unit")->capture_default_str();
@@ -47,16 +48,18 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   bool holds = true;
-  fmt::print("errors in mm/s², {} trials\n{:<42} {:>13} {:>11} {:>10} {:>8} {:>8} {:>9}\n", trials,
-             "noise and readings a pose", "least squares", "first order", "calibrate", "σ found",
-             "covered", "demanded");
+  fmt::print("errors in mm/s²\n{:<42} {:>7} {:>13} {:>11} {:>10} {:>8} {:>8} {:>9}\n",
+             "noise and readings a pose", "trials", "least squares", "first order", "calibrate",
+             "σ found", "covered", "demanded");
   for (const Row& row : rows()) {
-    const CodeErrors e = study_codes(row.c, trials, seed);
+    // The RMS error of 150 trials scatters by 3 % itself.
+    const int of_row = row.demanded > 0 ? 4 * trials : trials;
+    const CodeErrors e = study_codes(row.c, of_row, seed);
     const double limit = row.demanded > 0 ? row.demanded : 1.03 * e.least_squares;
     const bool good = e.chosen <= limit;
     holds = holds && good;
-    fmt::print("{:<42} {:>13.3f} {:>11.3f} {:>10.3f} {:>8.3f} {:>6.1f} % {:>9.3f}{}\n",
-               to_string(row.c), e.least_squares, e.first_order, e.chosen, e.sigma,
+    fmt::print("{:<42} {:>7} {:>13.3f} {:>11.3f} {:>10.3f} {:>8.3f} {:>6.1f} % {:>9.3f}{}\n",
+               to_string(row.c), of_row, e.least_squares, e.first_order, e.chosen, e.sigma,
                100 * e.coverage, limit, good ? "" : "  MISSED");
     std::fflush(stdout);
   }
