@@ -110,7 +110,7 @@ class OwnEffect final : public Effect {
       : description_(std::move(description)), reference_C_(reference_C) {
     auto first = std::make_unique<Evaluator>(description_);
     columns_ = first->column_name;
-    within_dwell_ = first->uses(kTimeInPose) && subject() == Subject::sensor;
+    within_dwell_ = first->uses(kTimeInPose);
     uses_temperature_ = first->uses(kTemperature);
     idle_.push_back(std::move(first));
   }
@@ -142,43 +142,21 @@ class OwnEffect final : public Effect {
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    const double angle_rad =
-        value(log, visit, nullptr, nullptr, p, mean_time_in_pose_s(log, visit)) / kDegrees;
-    switch (description_.target) {
-      case Target::delta:
-        head.delta_rad += angle_rad;
-        break;
-      case Target::h:
-        head.h_rad += angle_rad;
-        break;
-      case Target::roll:
-        head.roll_rad += angle_rad;
-        break;
-      case Target::skew:
-        head.skew_rad += angle_rad;
-        break;
-      default:
-        break;
-    }
+    head.*angle() += mean_over_dwell(
+        log, visit, [&](double since_s) { return angle_rad(log, visit, p, since_s); });
   }
   double term_g(const TermInput& input, const double* p) const override {
-    if (!within_dwell_) return sample_g(input, p, mean_time_in_pose_s(input.log, input.visit));
-    // The mean of the dwell, from so many of its samples.
-    constexpr std::size_t kMost = 32;
-    const Visit& visit = input.at();
-    const std::size_t points = std::min(visit.count, kMost);
-    const double step_s =
-        visit.step_s * static_cast<double>(visit.count) / static_cast<double>(points);
-    const double first_s = 0.5 * (step_s - visit.step_s);
-    double sum = 0;
-    for (std::size_t k = 0; k < points; ++k)
-      sum += sample_g(input, p, first_s + step_s * static_cast<double>(k));
-    return sum / static_cast<double>(points);
+    return mean_over_dwell(input.log, input.visit,
+                           [&](double since_s) { return sample_g(input, p, since_s); });
   }
   bool within_dwell() const override { return within_dwell_; }
   Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
     const auto value_at = [&](double since_s) { return sample_g(input, p, since_s); };
     return effect::since_arrival_s(input.at()).unaryExpr(value_at).matrix();
+  }
+  AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
+    const auto value_at = [&](double since_s) { return angle_rad(log, visit, p, since_s); };
+    return {angle(), effect::since_arrival_s(log.visits[visit]).unaryExpr(value_at).matrix()};
   }
   std::string definition() const override;
   const std::vector<std::string>& columns() const { return columns_; }
@@ -199,6 +177,35 @@ class OwnEffect final : public Effect {
   }
 
  private:
+  double HeadGeometry::*angle() const {
+    switch (description_.target) {
+      case Target::h:
+        return &HeadGeometry::h_rad;
+      case Target::roll:
+        return &HeadGeometry::roll_rad;
+      case Target::skew:
+        return &HeadGeometry::skew_rad;
+      default:
+        return &HeadGeometry::delta_rad;
+    }
+  }
+  double angle_rad(const VisitLog& log, std::size_t visit, const double* p, double since_s) const {
+    return value(log, visit, nullptr, nullptr, p, since_s) / kDegrees;
+  }
+  /// From so many of its samples; one in the middle where nothing changes in between.
+  template <class ValueAt>
+  double mean_over_dwell(const VisitLog& log, std::size_t visit, const ValueAt& value_at) const {
+    if (!within_dwell_) return value_at(mean_time_in_pose_s(log, visit));
+    constexpr std::size_t kMost = 32;
+    const Visit& at = log.visits[visit];
+    const std::size_t points = std::min(at.count, kMost);
+    const double step_s = at.step_s * static_cast<double>(at.count) / static_cast<double>(points);
+    const double first_s = 0.5 * (step_s - at.step_s);
+    double sum = 0;
+    for (std::size_t k = 0; k < points; ++k)
+      sum += value_at(first_s + step_s * static_cast<double>(k));
+    return sum / static_cast<double>(points);
+  }
   double sample_g(const TermInput& input, const double* p, double since_arrival_s) const {
     const double term = value(input.log, input.visit, &input.a_g, &input.axis, p, since_arrival_s);
     return description_.target == Target::scale ? term * input.a() : term;

@@ -131,12 +131,15 @@ std::vector<ActiveEffect> single_amplitudes(const Candidate& candidate) {
 }
 
 constexpr std::size_t kHead = 2 * kAxisCount;
+constexpr std::size_t kGroups = std::tuple_size_v<decltype(CandidateResponses::groups)>;
 
-bool is_within_dwell(std::size_t group) { return group >= kAxisCount && group < kHead; }
+bool is_head(std::size_t group) { return group >= kHead; }
+bool is_within_dwell(std::size_t group) { return group >= kAxisCount && group != kHead; }
 
 std::size_t group_of(const Candidate& candidate) {
-  if (candidate.effect->subject() == Subject::head) return kHead;
-  return candidate.axis + (candidate.effect->within_dwell() ? kAxisCount : 0);
+  const bool within_dwell = candidate.effect->within_dwell();
+  if (candidate.effect->subject() == Subject::head) return kHead + (within_dwell ? 1 : 0);
+  return candidate.axis + (within_dwell ? kAxisCount : 0);
 }
 
 // The course of the dwells that a sensor effect makes, V, n rows a contrast.
@@ -146,6 +149,23 @@ void set_dwell_response(const Baseline& base, const ActiveEffect& active,
   for (Eigen::Index k = 0; k < n; ++k) {
     const Eigen::VectorXd contrasts = dwell_contrasts_V(base.input(active.axis, k), active);
     for (Eigen::Index d = 0; d < contrasts.size(); ++d) change(d * n + k) = contrasts(d);
+  }
+}
+
+// The same of a head effect, axis by axis.
+void set_head_dwell_response(const Baseline& base, const ActiveEffect& active,
+                             Eigen::Ref<Eigen::VectorXd> change) {
+  const auto n = static_cast<Eigen::Index>(base.head.size());
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto visit = static_cast<std::size_t>(k);
+    const HeadCourse course = head_course(base.log, visit, base.head[visit], active);
+    const Eigen::Index contrasts = course.contrasts_rad.size();
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const double slope_V = base.model.twelve[i].head<3>().dot(course.slope_g_per_rad);
+      for (Eigen::Index d = 0; d < contrasts; ++d)
+        change((static_cast<Eigen::Index>(i) * contrasts + d) * n + k) =
+            slope_V * course.contrasts_rad(d);
+    }
   }
 }
 
@@ -163,7 +183,7 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
                                        const EnlargedParameters& model) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   CandidateResponses responses;
-  std::array<std::vector<ActiveEffect>, kHead + 1> singles;
+  std::array<std::vector<ActiveEffect>, kGroups> singles;
   for (const Candidate& candidate : list.candidates) {
     const std::size_t group = group_of(candidate);
     const std::vector<ActiveEffect> own = single_amplitudes(candidate);
@@ -176,14 +196,15 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
     Eigen::Index first, count;
   };
   std::vector<Block> blocks;  // of neighbouring columns
-  for (std::size_t g = 0; g <= kHead; ++g) {
+  for (std::size_t g = 0; g < kGroups; ++g) {
     CandidateResponses::Group& group = responses.groups[g];
     const Eigen::Index columns = std::ssize(singles[g]);
-    const auto axis = static_cast<Eigen::Index>(g == kHead ? 0 : g % kAxisCount);
+    const auto axis = static_cast<Eigen::Index>(is_head(g) ? 0 : g % kAxisCount);
+    const Eigen::Index rows = is_head(g) ? mean_rows(log) : n;
     group.first_row = axis * n;
-    group.means.resize(g == kHead ? mean_rows(log) : n, columns);
+    group.means.resize(rows, columns);
     group.first_dwell_row = mean_rows(log) + axis * log.dwell_contrasts() * n;
-    group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * n : 0, columns);
+    group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * rows : 0, columns);
     constexpr Eigen::Index kColumns = 192;
     for (Eigen::Index first = 0; first < columns; first += kColumns)
       blocks.push_back({g, first, std::min(kColumns, columns - first)});
@@ -193,21 +214,24 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
     CandidateResponses::Group& group = responses.groups[g];
     auto means = group.means.middleCols(first, count);
     auto dwells = group.dwells.middleCols(first, count);
-    if (g == kHead) means.setZero();
+    if (is_head(g)) means.setZero();
     for (Eigen::Index j = 0; j < count; ++j) {
       const ActiveEffect& single = singles[g][static_cast<std::size_t>(first + j)];
-      if (g == kHead) {
+      if (is_head(g)) {
         add_head_response(base, single, means.col(j));
+        if (is_within_dwell(g)) set_head_dwell_response(base, single, dwells.col(j));
       } else {
         set_sensor_response(base, single, means.col(j));
+        if (is_within_dwell(g)) set_dwell_response(base, single, dwells.col(j));
       }
-      if (is_within_dwell(g)) set_dwell_response(base, single, dwells.col(j));
     }
-    const std::size_t axis = g == kHead ? 0 : g % kAxisCount;
+    const std::size_t axis = is_head(g) ? 0 : g % kAxisCount;
+    const Eigen::Index contrasts = log.dwell_contrasts();
     for (Eigen::Index row = 0; row < means.rows(); row += n)
       whitening.apply_to_means(axis + static_cast<std::size_t>(row / n), means.middleRows(row, n));
     for (Eigen::Index d = 0; d * n < dwells.rows(); ++d)
-      dwells.middleRows(d * n, n) /= whitening.dwell_sd_V[axis](d);
+      dwells.middleRows(d * n, n) /=
+          whitening.dwell_sd_V[axis + static_cast<std::size_t>(d / contrasts)](d % contrasts);
   });
   return responses;
 }
@@ -215,7 +239,7 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
     : responses_(responses) {
   model_basis_ = orthonormal_basis(fit.whitened_jacobian);
-  std::array<Eigen::MatrixXd, kHead + 1> taken;  // by the model's parameters, columns × p
+  std::array<Eigen::MatrixXd, kGroups> taken;  // by the model's parameters, columns × p
   parallel_for(taken.size(),
                [&](std::size_t g) { taken[g] = responses.groups[g].products(model_basis_); });
   transform_.resize(responses.place.size());
@@ -248,7 +272,7 @@ Eigen::MatrixXd CandidateGains::project(const Eigen::MatrixXd& whitened) const {
 }
 
 Eigen::MatrixXd CandidateGains::of(const Eigen::MatrixXd& whitened) const {
-  std::array<Eigen::MatrixXd, kHead + 1> seen;  // columns × replicates
+  std::array<Eigen::MatrixXd, kGroups> seen;  // columns × replicates
   parallel_for(seen.size(),
                [&](std::size_t g) { seen[g] = responses_.groups[g].products(whitened); });
   Eigen::MatrixXd gain(std::ssize(transform_), whitened.cols());

@@ -58,8 +58,9 @@ struct CandidateResponses {
     Eigen::Index first = 0;
     Eigen::Index count = 0;
   };
-  std::array<Group, 2 * kAxisCount + 1> groups;  ///< x, y, z; x, y, z within the dwell; head
-  std::vector<Place> place;                      ///< one per candidate
+  /// x, y, z; x, y, z within the dwell; head; head within the dwell.
+  std::array<Group, 2 * kAxisCount + 2> groups;
+  std::vector<Place> place;  ///< one per candidate
 };
 
 /// One column for each amplitude of each candidate, at the parameters of `model`.

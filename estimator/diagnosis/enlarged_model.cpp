@@ -106,6 +106,18 @@ EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& act
   return model;
 }
 
+HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometry& head,
+                       const ActiveEffect& active) {
+  const AngleCourse course = active.effect->angle_course(log, visit, active.p.data());
+  constexpr double kStep_rad = 1e-5;
+  HeadGeometry above = head, below = head;
+  above.*course.angle += kStep_rad;
+  below.*course.angle -= kStep_rad;
+  return {
+      log.contrasts.at(log.visits[visit].count).transpose() * course.course_rad,
+      (specific_force_g(above, log.gamma) - specific_force_g(below, log.gamma)) / (2 * kStep_rad)};
+}
+
 TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
                      const std::vector<Eigen::Vector3d>& a_g, std::size_t visit) {
   const double K_ii = twelve(static_cast<Eigen::Index>(axis));
@@ -143,6 +155,19 @@ Eigen::VectorXd means_of_axis_V(const VisitLog& log, const EnlargedParameters& p
   return mean_V;
 }
 
+/// Calls work(visit, head_course()) for every head effect within the dwell.
+template <class Work>
+void for_head_courses(const VisitLog& log, const EnlargedParameters& parameters, const Work& work) {
+  std::vector<HeadGeometry> heads;
+  for (const ActiveEffect& active : parameters.effects) {
+    if (active.effect->subject() != Subject::head || !active.effect->within_dwell()) continue;
+    if (heads.empty()) heads = head_geometries(log, parameters);
+    for (std::size_t k = 0; k < heads.size(); ++k) {
+      work(static_cast<Eigen::Index>(k), head_course(log, k, heads[k], active));
+    }
+  }
+}
+
 /// n × contrasts.
 Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
                                  std::size_t axis, const Forces& a_g) {
@@ -153,6 +178,10 @@ Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& 
         if (active.effect->within_dwell())
           dwell_V.row(static_cast<Eigen::Index>(input.visit)) += dwell_contrasts_V(input, active);
       });
+  for_head_courses(log, parameters, [&](Eigen::Index k, const HeadCourse& course) {
+    dwell_V.row(k) +=
+        parameters.twelve[axis].head<3>().dot(course.slope_g_per_rad) * course.contrasts_rad;
+  });
   return dwell_V;
 }
 

@@ -64,6 +64,14 @@ PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
 /// Contrasts of one visit's dwell that one effect makes, V.
 Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active);
 
+/// What a head effect within the dwell does to a visit, to first order in the angle.
+struct HeadCourse {
+  Eigen::VectorXd contrasts_rad;    ///< of the angle
+  Eigen::Vector3d slope_g_per_rad;  ///< of the specific force by that angle
+};
+HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometry& head,
+                       const ActiveEffect& active);
+
 /// What is measured at n visits: the means, and what the samples say beyond them.
 struct Observations {
   PerAxis<Eigen::VectorXd> mean_V;

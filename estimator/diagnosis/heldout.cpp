@@ -120,11 +120,18 @@ double heldout_dwell_gain(const VisitLog& log, const Observations& observed,
   if (!active.effect->within_dwell()) return 0;
   EnlargedParameters fewer = fit.parameters;
   fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
-  const Eigen::MatrixXd without_V = predict_dwells_V(log, fewer)[active.axis];
-  const auto weights = whitening.dwell_sd_V[active.axis].cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd left = (observed.dwell_V[active.axis] - without_V) * weights;
-  const Eigen::MatrixXd response =
-      (predict_dwells_V(log, fit.parameters)[active.axis] - without_V) * weights;
+  const auto without_V = predict_dwells_V(log, fewer);
+  const auto with_V = predict_dwells_V(log, fit.parameters);
+  const std::vector<std::size_t> axes = axes_of(active);
+  const Eigen::Index n = std::ssize(log.visits), contrasts = log.dwell_contrasts();
+  Eigen::MatrixXd left(n, contrasts * std::ssize(axes)), response(left.rows(), left.cols());
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const std::size_t axis = axes[i];
+    const auto weights = whitening.dwell_sd_V[axis].cwiseInverse().asDiagonal();
+    const Eigen::Index first = static_cast<Eigen::Index>(i) * contrasts;
+    left.middleCols(first, contrasts) = (observed.dwell_V[axis] - without_V[axis]) * weights;
+    response.middleCols(first, contrasts) = (with_V[axis] - without_V[axis]) * weights;
+  }
   const double all_seen = left.cwiseProduct(response).sum(), all = response.squaredNorm();
   double before = 0, after = 0;
   for (const Blocks& blocks : partitions) {

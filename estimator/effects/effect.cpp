@@ -14,6 +14,11 @@ Eigen::VectorXd Effect::course_g(const TermInput& input, const double* p) const 
   return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(input.at().count), term_g(input, p));
 }
 
+AngleCourse Effect::angle_course(const VisitLog& log, std::size_t visit, const double*) const {
+  return {&HeadGeometry::delta_rad,
+          Eigen::VectorXd::Zero(static_cast<Eigen::Index>(log.visits[visit].count))};
+}
+
 namespace effect {
 
 double share_below(double edge, double value, double sd) {

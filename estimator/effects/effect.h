@@ -56,6 +56,12 @@ struct TermInput {
   double a() const { return a_g[visit](static_cast<Eigen::Index>(axis)); }
 };
 
+/// How one angle of the head moves while the sensor is read.
+struct AngleCourse {
+  double HeadGeometry::*angle = &HeadGeometry::delta_rad;
+  Eigen::VectorXd course_rad;  ///< at every sample of the visit
+};
+
 /// Stateless and immutable.
 class Effect {
  public:
@@ -80,10 +86,12 @@ class Effect {
                         HeadGeometry& head) const;
   /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
   virtual double term_g(const TermInput& input, const double* p) const;
-  /// Whether the term changes while the head rests; course_g() says how.
+  /// Whether it changes while the head rests; course_g() or angle_course() says how.
   virtual bool within_dwell() const { return false; }
   /// Sensor: the term at every sample of the visit, g.
   virtual Eigen::VectorXd course_g(const TermInput& input, const double* p) const;
+  /// Head, within the dwell: that of which displace() adds the mean.
+  virtual AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const;
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&) const { return false; }
   /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.

@@ -6,6 +6,7 @@
 #include "estimator/effects/driver.h"
 #include "estimator/effects/dwell_course.h"
 #include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/head_decay.h"
 
 namespace plumbline {
 
@@ -126,6 +127,9 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   }
   for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
     for (const int degree : {1, 2, 3}) add(dwell_course(log, of, degree));
+  for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
+    for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
+      add(head_decay(angle, of));
   return terms;
 }
 

@@ -104,6 +104,17 @@ TEST(OwnEffects, SeeWhatFormatsSays) {
   const double c = 90;
   (*turned)[0]->displace(log, 2, &c, head);
   EXPECT_NEAR(head.h_rad, std::acos(0), 1e-12);
+
+  const auto moving = parse_own_effects(effect("c * t_in_pose", "h"), "my.toml", 22);
+  ASSERT_TRUE(moving.has_value());
+  EXPECT_TRUE((*moving)[0]->within_dwell());
+  const AngleCourse course = (*moving)[0]->angle_course(log, 2, &c);
+  EXPECT_EQ(course.angle, &HeadGeometry::h_rad);
+  EXPECT_NEAR(course.course_rad(0), 0, 1e-12);
+  EXPECT_NEAR(course.course_rad(1), std::acos(0), 1e-12);
+  HeadGeometry half;
+  (*moving)[0]->displace(log, 2, &c, half);
+  EXPECT_NEAR(half.h_rad, 0.5 * std::acos(0), 1e-12);
 }
 
 TEST(OwnEffects, AreFoundAndKeptWithTheCalibration) {

@@ -11,6 +11,7 @@
 #include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
+#include "estimator/effects/head_decay.h"
 #include "estimator/kinematics.h"
 
 namespace plumbline {
@@ -137,6 +138,42 @@ TEST_F(EveryEffect, JacobianAgreesWithTheChangeThatAStepMakes) {
             << effect->id() << " " << infos[k].name;
       }
       ++column;
+    }
+  }
+}
+
+// The head still moves while the sensor is read: mean and contrasts are those of readings taken at
+// the angle of each moment, but for the square of an angle that is small.
+TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
+  const VisitLog log = example_log();
+  for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
+    for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way}) {
+      const auto effect = head_decay(angle, of);
+      const std::vector<Hypothesis> starts = effect->hypotheses(log, 0);
+      ASSERT_EQ(starts.size(), 12u);
+      const int visit = 17;
+      const Visit &before = log.visits.at(visit - 1), &at = log.visits.at(visit);
+      const double way_rad = angle == &HeadGeometry::delta_rad ? before.delta_rad - at.delta_rad
+                                                               : before.h_rad - at.h_rad;
+      for (const Hypothesis& start : starts) {
+        const ActiveEffect active = activate(*effect, 0, start);
+        const double rad_of[] = {effect::kRadPerDeg, effect::kRadPerDeg * std::cos(at.h_rad),
+                                 way_rad};
+        Eigen::VectorXd reading_V(8);
+        for (Eigen::Index m = 0; m < 8; ++m) {
+          HeadGeometry head{at.delta_rad, at.h_rad};
+          head.*angle += start.p[0] * rad_of[static_cast<int>(of)] *
+                         (std::exp(-0.01 * static_cast<double>(m) / start.p[1]) - start.p[2]);
+          reading_V(m) = twelve().twelve[1].head<3>().dot(specific_force_g(head, log.gamma));
+        }
+        const EnlargedParameters with = with_effect(twelve(), active);
+        EXPECT_NEAR(predict_means_V(log, with)[1](visit), twelve().twelve[1](3) + reading_V.mean(),
+                    5e-9)
+            << effect->shape();
+        const Eigen::VectorXd contrasts = log.contrasts.at(8).transpose() * reading_V;
+        EXPECT_LT((predict_dwells_V(log, with)[1].row(visit).transpose() - contrasts).norm(), 5e-9)
+            << effect->shape();
+      }
     }
   }
 }

@@ -59,8 +59,8 @@ TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
 // Shapes that a low polynomial or harmonic series does not have: what is left of them must not go
 // by listed names.
 TEST(DiagnosisStudy, EffectsWithSharpShapesHaveTheirDriverAndNoListedName) {
-  for (const char* effect :
-       {"own.gain_ranging", "own.worn_tooth", "own.cable_pull", "own.compressor", "own.stiction"}) {
+  for (const char* effect : {"own.gain_ranging", "own.worn_tooth", "own.cable_pull",
+                             "own.compressor", "own.stiction", "own.brake_sag"}) {
     const SetOutcome outcome = run_set({.seed = 120002,
                                         .effects = {effect},
                                         .size = 3,

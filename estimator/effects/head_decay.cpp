@@ -1,0 +1,89 @@
+#include "estimator/effects/head_decay.h"
+
+#include <cmath>
+
+namespace plumbline {
+namespace {
+
+class HeadDecay final : public SmoothTerm {
+ public:
+  HeadDecay(double HeadGeometry::*angle, DecayOf of) : angle_(angle), of_(of) {}
+
+  std::string id() const override { return "unlisted:t_in_pose:geometry"; }
+  const std::string& driver() const override { return driver_; }
+  TermForm form() const override { return TermForm::geometry; }
+  std::string shape() const override {
+    const std::string words = is_delta() ? "exponential after arrival, added to delta"
+                                         : "exponential after arrival, added to h";
+    switch (of_) {
+      case DecayOf::one:
+        break;
+      case DecayOf::weight:
+        return words + ", times the cosine of h";
+      case DecayOf::way:
+        return words + ", times the way turned";
+    }
+    return words;
+  }
+  Subject subject() const override { return Subject::head; }
+  bool within_dwell() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    // true_at 0: the angle is right in the end; 1: it was right on arrival.
+    return {{"c", of_ == DecayOf::way ? "" : "deg", ParameterRole::amplitude},
+            {"tau", "s", ParameterRole::shape},
+            {"true_at", "", ParameterRole::index}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    const Visit& visit = log.visits.front();
+    const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+    if (!(dwell_s > 0)) return {};
+    const double size = of_ == DecayOf::way ? effect::kSmallTerm : effect::kSmallAngle_deg;
+    std::vector<Hypothesis> starts;
+    for (const double tau_s : effect::geometric(dwell_s / 10, dwell_s * 3, 6))
+      for (const double true_at : {0.0, 1.0}) starts.push_back({{size, tau_s, true_at}});
+    return starts;
+  }
+  void displace(const VisitLog& log, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    const Visit& at = log.visits[visit];
+    const double decay = effect::mean_decay(at, at.t_arrival_s, p[1]);
+    head.*angle_ += size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0));
+  }
+  AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
+    const Eigen::ArrayXd decay = (-effect::since_arrival_s(log.visits[visit]) / p[1]).exp();
+    return {angle_, size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
+  }
+
+ private:
+  bool is_delta() const { return angle_ == &HeadGeometry::delta_rad; }
+  /// From arrival to the end.
+  double size_rad(const VisitLog& log, std::size_t visit, const double* p) const {
+    const Visit& at = log.visits[visit];
+    switch (of_) {
+      case DecayOf::one:
+        break;
+      case DecayOf::weight:
+        return p[0] * std::cos(at.h_rad) * effect::kRadPerDeg;
+      case DecayOf::way: {
+        if (visit == 0) return 0;
+        const Visit& before = log.visits[visit - 1];
+        return p[0] * (is_delta()
+                           ? std::remainder(before.delta_rad - at.delta_rad, effect::kTurn_rad)
+                           : before.h_rad - at.h_rad);
+      }
+    }
+    return p[0] * effect::kRadPerDeg;
+  }
+
+  double HeadGeometry::*angle_;
+  DecayOf of_;
+  std::string driver_ = "t_in_pose";
+};
+
+}  // namespace
+
+std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, DecayOf of) {
+  return std::make_unique<HeadDecay>(angle, of);
+}
+
+}  // namespace plumbline
