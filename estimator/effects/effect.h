@@ -132,19 +132,6 @@ double share_below(double edge, double value, double sd);
 inline constexpr double kLeastNoise = 0.02;  ///< steps, where a search for more starts
 inline constexpr double kMostNoise = 3;      ///< steps, beyond which nothing of them is left
 inline constexpr double kReach = 6;  ///< standard deviations beyond which noise does not come
-/// Mean of f(u + noise) over Gaussian noise of standard deviation `sd`: what averaging many
-/// readings leaves of a kink in f. Where f jumps, share_below() is smooth and this is not.
-template <class Function>
-double mean_over_noise(Function f, double u, double sd) {
-  // Midpoints of equal parts of the normal distribution: robust at kinks, unlike Gauss–Hermite.
-  static constexpr double kQuantile[] = {-1.959964, -1.439531, -1.150349, -0.934589, -0.755415,
-                                         -0.597760, -0.453762, -0.318639, -0.189118, -0.062707,
-                                         0.062707,  0.189118,  0.318639,  0.453762,  0.597760,
-                                         0.755415,  0.934589,  1.150349,  1.439531,  1.959964};
-  double sum = 0;
-  for (double q : kQuantile) sum += f(u + q * sd);
-  return sum / static_cast<double>(std::size(kQuantile));
-}
 
 }  // namespace effect
 

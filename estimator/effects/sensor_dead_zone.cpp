@@ -22,9 +22,7 @@ class DeadZone final : public Effect {
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double w_g = std::abs(p[0]);
-    return effect::mean_over_noise([w_g](double r) { return -std::clamp(r, -w_g, w_g); },
-                                   input.response_g,
-                                   input.log.sample_sd_V[input.axis] / std::abs(input.K_V_per_g));
+    return -std::clamp(input.response_g, -w_g, w_g);
   }
 };
 

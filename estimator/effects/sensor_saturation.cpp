@@ -16,14 +16,14 @@ class Saturation final : public Effect {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     std::vector<Hypothesis> starts;
-    for (double L_g = 0.5; L_g < 1.0; L_g += 0.03) starts.push_back({{L_g}});
+    // Near the largest response few readings tell one limit from the next.
+    for (double L_g = 0.5; L_g < 0.96; L_g += 0.03) starts.push_back({{L_g}});
+    for (const double L_g : {0.965, 0.98, 0.99}) starts.push_back({{L_g}});
     return starts;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double L_g = std::abs(p[0]);
-    return effect::mean_over_noise([L_g](double r) { return std::clamp(r, -L_g, L_g) - r; },
-                                   input.response_g,
-                                   input.log.sample_sd_V[input.axis] / std::abs(input.K_V_per_g));
+    return std::clamp(input.response_g, -L_g, L_g) - input.response_g;
   }
 };
 
