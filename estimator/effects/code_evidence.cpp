@@ -175,13 +175,14 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   };
   const auto steps_below = [&](double& tried, double finest) {
     Steps steps;
-    for (; tried > finest; tried *= 1 - resolution / 3) {
-      if (fit(tried).good) {
+    while (tried > finest) {
+      const bool good = fit(tried).good;
+      if (!good && steps.first > 0) break;
+      if (good) {
         if (steps.first == 0) steps.first = tried;
         steps.last = tried;
-      } else if (steps.first > 0) {
-        break;
       }
+      tried *= 1 - resolution / 3;
     }
     steps.least_spread = tolerance;
     constexpr int kCloser = 64;

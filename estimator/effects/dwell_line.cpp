@@ -162,7 +162,8 @@ double best_frequency(const Dwells& dwells, double f_hz, double width_hz,
   double best_hz = f_hz, best_power = joint_power(dwells, f_hz);
   for (const std::ptrdiff_t peak : peaks) {
     double at_hz = f_hz + bin_hz * static_cast<double>(peak), power = joint_power(dwells, at_hz);
-    for (double step_hz = 0.5 * bin_hz; step_hz > 1e-2 * bin_hz; step_hz /= 2) {
+    double step_hz = 0.5 * bin_hz;
+    while (step_hz > 1e-2 * bin_hz) {
       const double centre_hz = at_hz;
       for (const double trial_hz : {centre_hz - step_hz, centre_hz + step_hz}) {
         const double trial = joint_power(dwells, trial_hz);
@@ -170,6 +171,7 @@ double best_frequency(const Dwells& dwells, double f_hz, double width_hz,
         power = trial;
         at_hz = trial_hz;
       }
+      step_hz /= 2;
     }
     if (power <= best_power) continue;
     best_power = power;

@@ -13,8 +13,8 @@ class HeadDecay final : public SmoothTerm {
   const std::string& driver() const override { return driver_; }
   TermForm form() const override { return TermForm::geometry; }
   std::string shape() const override {
-    const std::string words = is_delta() ? "exponential after arrival, added to delta"
-                                         : "exponential after arrival, added to h";
+    std::string words = is_delta() ? "exponential after arrival, added to delta"
+                                   : "exponential after arrival, added to h";
     switch (of_) {
       case DecayOf::one:
         break;
