@@ -345,17 +345,25 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
 Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
                                const std::vector<PowersAllowance>& allowances) {
   constexpr double kFewest = 4;  // degrees of freedom; of fewer hardly anything is known
+  constexpr double kMost = 1;    // of C: an expansion to second order says nothing beyond
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(C.rows());
   for (const PowersAllowance& allowance : allowances) {
     M += allowance.M;
     variance += allowance.variance;
   }
+  const Eigen::LLT<Eigen::MatrixXd> root(C);
+  if (root.info() != Eigen::Success) return C;
+  const Eigen::MatrixXd L = root.matrixL();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> relative(L.transpose() * M * L);
+  const Eigen::MatrixXd axes = L * relative.eigenvectors();
+  const Eigen::MatrixXd allowance =
+      axes * relative.eigenvalues().cwiseMin(kMost).asDiagonal() * axes.transpose();
   const Eigen::VectorXd wider =
       (2 * C.diagonal().array().square() / variance.array().max(1e-300))
           .max(kFewest)
           .unaryExpr([](double dof) { return std::sqrt(dof / (dof - 2)); });
-  return wider.asDiagonal() * (C + C * M * C) * wider.asDiagonal();
+  return wider.asDiagonal() * (C + allowance) * wider.asDiagonal();
 }
 
 Eigen::VectorXd NoisePool::starting_powers() const {

@@ -112,7 +112,8 @@ struct PowersAllowance {
 PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const EstimatedPowers& powers,
                                      const Eigen::MatrixXd& V, const Eigen::MatrixXd& X,
                                      const Eigen::MatrixXd& C);
-/// C with the allowances of all records, whose noise is independent, and every standard uncertainty
+/// C with the allowances of all records, whose noise is independent, at most doubled by them, and
+/// every standard uncertainty
 /// with that of Student's t for its degrees of freedom ν = 2·C²/var C, by √(ν/(ν − 2))
 /// (Satterthwaite; JCGM 101:2008, 6.4.9.4).
 Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,

@@ -293,6 +293,9 @@ TEST(AllowanceForPowers, SlowNoiseThatMayNotBeThereCountsAsFarAsItIsLikely) {
   EXPECT_GT(variance_at_gain(0), white);
   EXPECT_LT(variance_at_gain(0), 0.5 * C(2, 2));
   EXPECT_GT(variance_at_gain(30), C(2, 2));
+  // Powers of which next to nothing is known make nothing of the estimates.
+  information.diagonal() << 1e20, 1e10;
+  EXPECT_LT(variance_at_gain(30), 4.01 * C(2, 2));
 }
 
 // K_z hangs on what changes slowly, and a few slow noise values say little of their own variance.
