@@ -96,6 +96,19 @@ TEST(DiagnosisStudy, ACodeStepInSlowNoiseIsNamedAndNoPoseIsBlamed) {
       run_set(coarse_in_slow_noise(73002, "adc.code_step", sim::RecordOrder::snake)));
 }
 
+// A third of the poses read the same code: what is known of the noise of that axis is next to
+// nothing, and its sensitivity was said to be, too.
+TEST(DiagnosisStudy, AClippedAxisOfACoarseConverterIsStillAnAxis) {
+  expect_only_finding(run_set({.seed = 350002,
+                               .effects = {"sensor.saturation"},
+                               .size = 10,
+                               .order = sim::RecordOrder::snake,
+                               .noise = NoiseKind::white,
+                               .bits = 12,
+                               .samples_per_pose = 40,
+                               .static_s = 600}));
+}
+
 TEST(DiagnosisStudy, AStuckBitOfACoarseConverterIsTheOnlyFinding) {
   const SetOutcome outcome =
       run_set(coarse_in_slow_noise(74003, "adc.stuck_bit", sim::RecordOrder::random));
