@@ -121,8 +121,9 @@ Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64
   const CsvOptions rows{.skip_bad_rows = files.skip_bad_rows};
   Result<MeasurementSet> run;
   Result<StaticRecord> record;
-  std::vector<std::filesystem::path> inputs = {files.samples, files.static_record, files.config};
-  if (files.static_record.empty()) inputs.erase(inputs.begin() + 1);
+  std::vector<std::filesystem::path> inputs = {files.samples};
+  if (!files.static_record.empty()) inputs.push_back(files.static_record);
+  inputs.push_back(files.config);
   std::vector<Result<std::string>> hashes(inputs.size());
   const std::vector<std::function<void()>> readings = {
       [&] { run = read_samples(files.samples, rows); },

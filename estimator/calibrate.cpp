@@ -126,10 +126,8 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
 /// The covariance of estimates under noise V, the powers of the noise being estimates, too.
 Eigen::Matrix4d with_allowance_for_noise(const Experiment& experiment, const AxisWork& work,
                                          const Eigen::MatrixXd& V, const Eigen::Matrix4d& C) {
-  const EstimatedPowers powers{work.pooled.power, work.test.present, work.test.information,
-                               work.test.gain_of_slow};
-  return with_allowance(C,
-                        {allowance_for_powers(experiment.processes, powers, V, experiment.A, C)});
+  return with_allowance(
+      C, {allowance_for_powers(experiment.processes, work.test.powers, V, experiment.A, C)});
 }
 
 /// Estimates from the codes where rounding matters.
@@ -275,14 +273,14 @@ void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_pe
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
   u_floor_mps2 = 0;
 
-  const std::vector<Eigen::Index>& present = work.test.present;
+  const std::vector<Eigen::Index>& present = work.test.powers.present;
   if (!work.noise_known || present.empty()) return;
   Eigen::VectorXd slope(std::ssize(present));
   for (Eigen::Index i = 0; i < slope.size(); ++i)
     slope(i) = expected_mean_square_V2(
         experiment.A, work.fit.gain,
         experiment.processes.unit[static_cast<std::size_t>(present[static_cast<std::size_t>(i)])]);
-  const double variance = propagated_variance(work.test.information, slope);
+  const double variance = propagated_variance(work.test.powers.information, slope);
   u_floor_mps2 =
       std::abs(mps2_per_V) * std::sqrt(std::max(variance, 0.0)) / (2.0 * std::sqrt(mean_square));
 }

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <iterator>
 #include <system_error>
-#include <vector>
 
 namespace plumbline::app {
 
@@ -18,7 +18,7 @@ Result<std::string> read_file(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream stream(path, std::ios::binary);
   std::string text;
-  std::vector<char> block(1 << 20);
+  std::array<char, 1 << 16> block;
   while (stream.read(block.data(), std::ssize(block)), stream.gcount() > 0)
     text.append(block.data(), static_cast<std::size_t>(stream.gcount()));
   if (!stream.is_open() || stream.bad()) {

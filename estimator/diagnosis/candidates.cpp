@@ -159,13 +159,12 @@ void set_head_dwell_response(const Baseline& base, const ActiveEffect& active,
   for (Eigen::Index k = 0; k < n; ++k) {
     const auto visit = static_cast<std::size_t>(k);
     const HeadCourse course = head_course(base.log, visit, base.head[visit], active);
-    const Eigen::Index contrasts = course.contrasts_rad.size();
-    for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const double slope_V = base.model.twelve[i].head<3>().dot(course.slope_g_per_rad);
-      for (Eigen::Index d = 0; d < contrasts; ++d)
-        change((static_cast<Eigen::Index>(i) * contrasts + d) * n + k) =
-            slope_V * course.contrasts_rad(d);
-    }
+    Eigen::Index row = k;
+    for (const Eigen::Vector4d& twelve : base.model.twelve)
+      for (const double contrast_V : course.contrasts_V(twelve)) {
+        change(row) = contrast_V;
+        row += n;
+      }
   }
 }
 

@@ -155,22 +155,27 @@ Eigen::VectorXd means_of_axis_V(const VisitLog& log, const EnlargedParameters& p
   return mean_V;
 }
 
-/// Calls work(visit, head_course()) for every head effect within the dwell.
-template <class Work>
-void for_head_courses(const VisitLog& log, const EnlargedParameters& parameters, const Work& work) {
+/// What the head does within the dwells, seen by all axes.
+struct HeadAtVisit {
+  Eigen::Index visit;
+  HeadCourse course;
+};
+std::vector<HeadAtVisit> head_courses(const VisitLog& log, const EnlargedParameters& parameters) {
+  std::vector<HeadAtVisit> courses;
   std::vector<HeadGeometry> heads;
   for (const ActiveEffect& active : parameters.effects) {
     if (active.effect->subject() != Subject::head || !active.effect->within_dwell()) continue;
     if (heads.empty()) heads = head_geometries(log, parameters);
-    for (std::size_t k = 0; k < heads.size(); ++k) {
-      work(static_cast<Eigen::Index>(k), head_course(log, k, heads[k], active));
-    }
+    for (std::size_t k = 0; k < heads.size(); ++k)
+      courses.push_back({static_cast<Eigen::Index>(k), head_course(log, k, heads[k], active)});
   }
+  return courses;
 }
 
 /// n × contrasts.
 Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
-                                 std::size_t axis, const Forces& a_g) {
+                                 std::size_t axis, const Forces& a_g,
+                                 const std::vector<HeadAtVisit>& head) {
   Eigen::MatrixXd dwell_V = Eigen::MatrixXd::Zero(std::ssize(a_g), log.dwell_contrasts());
   if (!has_effect_within_dwell(parameters)) return dwell_V;
   for_sensor_terms(
@@ -178,10 +183,8 @@ Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& 
         if (active.effect->within_dwell())
           dwell_V.row(static_cast<Eigen::Index>(input.visit)) += dwell_contrasts_V(input, active);
       });
-  for_head_courses(log, parameters, [&](Eigen::Index k, const HeadCourse& course) {
-    dwell_V.row(k) +=
-        parameters.twelve[axis].head<3>().dot(course.slope_g_per_rad) * course.contrasts_rad;
-  });
+  for (const auto& [visit, course] : head)
+    dwell_V.row(visit) += course.contrasts_V(parameters.twelve[axis]);
   return dwell_V;
 }
 
@@ -194,9 +197,10 @@ PerAxis<Eigen::VectorXd> means_V(const VisitLog& log, const EnlargedParameters& 
 
 PerAxis<Eigen::MatrixXd> dwells_V(const VisitLog& log, const EnlargedParameters& parameters,
                                   const Forces& a_g) {
+  const std::vector<HeadAtVisit> head = head_courses(log, parameters);
   PerAxis<Eigen::MatrixXd> dwell_V;
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    dwell_V[i] = dwells_of_axis_V(log, parameters, i, a_g);
+    dwell_V[i] = dwells_of_axis_V(log, parameters, i, a_g, head);
   return dwell_V;
 }
 
@@ -310,6 +314,7 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
   const Eigen::VectorXd centre = parameters.free_values();
   const std::vector<FreeParameter> free = free_parameters(parameters);
   const Forces a_g = specific_forces_g(log, parameters);
+  const std::vector<HeadAtVisit> head = head_courses(log, parameters);
   const Eigen::Index n = std::ssize(a_g), contrasts = log.dwell_contrasts();
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(stacked_rows(log), centre.size());
   parallel_for(free.size(), [&](std::size_t column) {
@@ -328,14 +333,15 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
           (predict_stacked_V(log, above) - predict_stacked_V(log, below)) / (2 * step);
       return;
     }
-    // What belongs to one axis leaves the head, and so the forces, where they are.
+    // What belongs to one axis leaves the head, and so the forces, as they are.
     const std::size_t axis = *only_axis;
     const auto i = static_cast<Eigen::Index>(axis);
     jacobian.col(j).segment(i * n, n) =
         (means_of_axis_V(log, above, axis, a_g) - means_of_axis_V(log, below, axis, a_g)) /
         (2 * step);
     jacobian.col(j).segment((kAxes + i * contrasts) * n, contrasts * n) =
-        (dwells_of_axis_V(log, above, axis, a_g) - dwells_of_axis_V(log, below, axis, a_g))
+        (dwells_of_axis_V(log, above, axis, a_g, head) -
+         dwells_of_axis_V(log, below, axis, a_g, head))
             .reshaped() /
         (2 * step);
   });

@@ -68,6 +68,11 @@ Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& ac
 struct HeadCourse {
   Eigen::VectorXd contrasts_rad;    ///< of the angle
   Eigen::Vector3d slope_g_per_rad;  ///< of the specific force by that angle
+
+  /// Of the readings of an axis with these parameters.
+  Eigen::VectorXd contrasts_V(const Eigen::Vector4d& twelve) const {
+    return twelve.head<3>().dot(slope_g_per_rad) * contrasts_rad;
+  }
 };
 HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometry& head,
                        const ActiveEffect& active);

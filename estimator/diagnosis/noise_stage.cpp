@@ -173,13 +173,10 @@ Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchR
   parallel_for(kAxisCount, [&](std::size_t i) {
     const Eigen::MatrixXd X = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     const PooledNoise& noise = found.noise[i];
-    const std::vector<Eigen::Index> present = noise.present();
     const NoisePool pool(input.processes, record_of(input, i, found.coarse[i]), found.own_V2[i]);
     const Eigen::MatrixXd design = independent_columns(X);
-    const EstimatedPowers powers{
-        noise.power, present,
-        pool.information_of(noise.power, make_projector(noise.covariance, design).P, present),
-        pool.gain_of_slow_noise(noise, found.observed.mean_V[i] - predicted[i], design)};
+    const EstimatedPowers powers = pool.estimated(noise, make_projector(noise.covariance, design).P,
+                                                  found.observed.mean_V[i] - predicted[i], design);
     of_axis[i] = allowance_for_powers(input.processes, powers, noise.covariance, X, C);
   });
   return with_allowance(C, of_axis);

@@ -188,9 +188,7 @@ ResidualTestResult test_residual(const NoiseModel& noise, const ResidualTestInpu
       beside = &full;
     }
   }
-  result.present = judged.noise.present();
-  result.information = pool.information_of(judged.noise.power, judged.P, result.present);
-  result.gain_of_slow = pool.gain_of_slow_noise(judged.noise, y, *beside);
+  result.powers = pool.estimated(judged.noise, judged.P, y, *beside);
   result.noise = std::move(judged.noise);
   result.chi2 = judged.chi2;
   result.dof = static_cast<double>(n - input.design.cols());

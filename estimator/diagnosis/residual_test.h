@@ -26,16 +26,14 @@ struct ResidualTestInput {
 inline constexpr double kDofOfCoarseReadings = 6;
 
 struct ResidualTestResult {
-  double chi2 = 0;                    ///< whitened sum of squares r'Σ⁻¹r
-  double dof = 0;                     ///< n − p
-  double p_value = 1;                 ///< of the combined test
-  double p_structure = 1;             ///< functions of position, way to the pose and drivers
-  double p_excess = 1;                ///< more scatter from pose to pose than the noise allows
-  double p_outlier = 1;               ///< the most deviating single pose
-  PooledNoise noise;                  ///< noise powers under "no effect", and the Σ that was used
-  std::vector<Eigen::Index> present;  ///< the powers that are not zero
-  Eigen::MatrixXd information;        ///< about those, the others held at zero
-  double gain_of_slow = 0;            ///< of −2 ln L, by the slow ones among them
+  double chi2 = 0;         ///< whitened sum of squares r'Σ⁻¹r
+  double dof = 0;          ///< n − p
+  double p_value = 1;      ///< of the combined test
+  double p_structure = 1;  ///< functions of position, way to the pose and drivers
+  double p_excess = 1;     ///< more scatter from pose to pose than the noise allows
+  double p_outlier = 1;    ///< the most deviating single pose
+  PooledNoise noise;       ///< noise powers under "no effect", and the Σ that was used
+  EstimatedPowers powers;  ///< what is known of those
 };
 
 /// Pose means of temperature and covariates, n×k, for ResidualTestInput::drivers; a quantity that

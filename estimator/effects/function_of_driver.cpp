@@ -31,7 +31,7 @@ class FunctionOfDriver : public SmoothTerm {
   }
   void displace(const VisitLog&, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    turned(head) += of_visit(0, visit, p) * effect::kRadPerDeg;
+    head.*target_.angle += of_visit(0, visit, p) * effect::kRadPerDeg;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double f = driver_->output_of == input.axis ? at(input.output_V, p)
@@ -73,20 +73,6 @@ class FunctionOfDriver : public SmoothTerm {
         range = {std::min(range.first, value), std::max(range.second, value)};
     return range;
   }
-  double& turned(HeadGeometry& head) const {
-    switch (target_.angle) {
-      case Target::Angle::delta:
-        break;
-      case Target::Angle::h:
-        return head.h_rad;
-      case Target::Angle::base_roll:
-        return head.roll_rad;
-      case Target::Angle::skew:
-        return head.skew_rad;
-    }
-    return head.delta_rad;
-  }
-
   DriverPointer driver_;
   Target target_;
   std::pair<double, double> range_;  ///< asked for whenever a parameter is described
@@ -383,16 +369,9 @@ class PlayLag final : public FunctionOfDriver {
 
 std::string Target::words() const {
   if (form == TermForm::geometry) {
-    switch (angle) {
-      case Angle::delta:
-        break;
-      case Angle::h:
-        return ", added to h";
-      case Angle::base_roll:
-        return ", added to the base roll";
-      case Angle::skew:
-        return ", added to the skew of the spindle";
-    }
+    if (angle == &HeadGeometry::h_rad) return ", added to h";
+    if (angle == &HeadGeometry::roll_rad) return ", added to the base roll";
+    if (angle == &HeadGeometry::skew_rad) return ", added to the skew of the spindle";
     return ", added to delta";
   }
   static const char* const kComponent[] = {"its own component", "the component of the next axis",

@@ -15,10 +15,8 @@ using DriverPointer = std::shared_ptr<const Driver>;
 
 /// What a function of the visits acts on.
 struct Target {
-  enum class Angle { delta, h, base_roll, skew };
-
   TermForm form = TermForm::bias;
-  Angle angle = Angle::delta;  ///< geometry
+  double HeadGeometry::*angle = &HeadGeometry::delta_rad;  ///< geometry
   /// Scale: the components multiplied are those of axes i + other and, if any, i + second.
   std::size_t other = 0;
   std::optional<std::size_t> second = {};

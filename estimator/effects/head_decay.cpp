@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/effects/function_of_driver.h"
+
 namespace plumbline {
 namespace {
 
@@ -13,8 +15,8 @@ class HeadDecay final : public SmoothTerm {
   const std::string& driver() const override { return driver_; }
   TermForm form() const override { return TermForm::geometry; }
   std::string shape() const override {
-    std::string words = is_delta() ? "exponential after arrival, added to delta"
-                                   : "exponential after arrival, added to h";
+    std::string words =
+        "exponential after arrival" + Target{.form = TermForm::geometry, .angle = angle_}.words();
     switch (of_) {
       case DecayOf::one:
         break;

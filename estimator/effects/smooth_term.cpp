@@ -62,9 +62,9 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
                         : polynomial(driver, target, degree));
   };
   const Target bias{TermForm::bias}, scale{TermForm::scale};
-  const Target of_delta{TermForm::geometry}, of_h{TermForm::geometry, Target::Angle::h};
-  const Target of_roll{TermForm::geometry, Target::Angle::base_roll};
-  const Target of_skew{TermForm::geometry, Target::Angle::skew};
+  const Target of_delta{TermForm::geometry}, of_h{TermForm::geometry, &HeadGeometry::h_rad};
+  const Target of_roll{TermForm::geometry, &HeadGeometry::roll_rad};
+  const Target of_skew{TermForm::geometry, &HeadGeometry::skew_rad};
   for (Driver& each : instantaneous_drivers(log)) {
     const auto driver = std::make_shared<const Driver>(std::move(each));
     if (!any && !driver->varies()) continue;  // a variable that never varied drives nothing

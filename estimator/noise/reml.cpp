@@ -279,11 +279,14 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
   return 0.5 * information;
 }
 
-std::vector<Eigen::Index> PooledNoise::present() const {
-  std::vector<Eigen::Index> found;
-  for (Eigen::Index i = 0; i < power.size(); ++i)
-    if (power(i) > 0) found.push_back(i);
-  return found;
+EstimatedPowers NoisePool::estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
+                                     const Eigen::VectorXd& mean,
+                                     const Eigen::MatrixXd& design) const {
+  EstimatedPowers powers{found.power, {}, {}, gain_of_slow_noise(found, mean, design)};
+  for (Eigen::Index i = 0; i < found.power.size(); ++i)
+    if (found.power(i) > 0) powers.present.push_back(i);
+  powers.information = information_of(found.power, P, powers.present);
+  return powers;
 }
 
 namespace {
@@ -323,8 +326,8 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
   Eigen::MatrixXd slope(p, count);  // of the diagonal of C
   for (const Eigen::Index i : powers.present) {
     const Eigen::MatrixXd moved = processes.unit[static_cast<std::size_t>(i)] * B;
-    slope.col(std::ssize(P)) = (C * (B.transpose() * moved) * C).diagonal();
     P.emplace_back(B.transpose() * moved);
+    slope.col(std::ssize(P) - 1) = (C * P.back() * C).diagonal();
     Z.emplace_back(factor.matrixL().solve(moved));
   }
   const Eigen::MatrixXd W = inverse_of_information(powers.information);

@@ -31,9 +31,14 @@ struct PooledNoise {
   /// −2 ln of the full likelihood at these powers but for a constant: comparable between designs.
   double likelihood_deviance = 0;
   bool converged = false;
+};
 
-  /// Processes with power, ascending.
-  std::vector<Eigen::Index> present() const;
+/// Powers that were estimated, and what is known of them.
+struct EstimatedPowers {
+  Eigen::VectorXd power;              ///< one per process
+  std::vector<Eigen::Index> present;  ///< those that are not zero, ascending
+  Eigen::MatrixXd information;        ///< about those, the others held at zero
+  double gain_of_slow = 0;            ///< of −2 ln L, by the slow ones among them
 };
 
 /// Restricted maximum likelihood (Patterson & Thompson, 1971) of the powers, all ≥ 0, given window
@@ -51,10 +56,10 @@ class NoisePool {
   /// mean: n; design: n×p of full rank, n > p. `start`: powers to begin with, or null.
   PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                    const Eigen::VectorXd* start = nullptr) const;
-  /// By how much −2 ln of the restricted likelihood is better with the slow processes of `found`,
-  /// which pool() found for the same mean and design, than without any.
-  double gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
-                            const Eigen::MatrixXd& design) const;
+  /// What is known of the powers that pool() found for this mean and design; P is the projector of
+  /// their Σ and of the design.
+  EstimatedPowers estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
+                            const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
   /// Expected information of both sources about the `wanted` powers, the others held, where the
   /// powers are `power` and P is the projector of their Σ and of the design.
   Eigen::MatrixXd information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
@@ -73,6 +78,10 @@ class NoisePool {
   Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                  const Eigen::MatrixXd& design) const;
   Eigen::VectorXd starting_powers() const;
+  /// By how much −2 ln of the restricted likelihood is better with the slow processes of `found`
+  /// than without any.
+  double gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
+                            const Eigen::MatrixXd& design) const;
   /// pool() from powers to begin with and with which of them are free.
   PooledNoise climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
@@ -92,14 +101,6 @@ NoiseModel without_record(NoiseModel model);
 NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
                            const PooledNoise& pooled, double span_s);
 
-/// Powers that were estimated, with what is known of those `present`.
-struct EstimatedPowers {
-  const Eigen::VectorXd& power;
-  std::vector<Eigen::Index> present;
-  Eigen::MatrixXd information;  ///< as information_of() gives it
-  double gain_of_slow = 0;      ///< as gain_of_slow_noise() gives it
-};
-
 /// What one record adds to the knowledge that the powers of its noise are estimates. p parameters.
 struct PowersAllowance {
   Eigen::MatrixXd M;         ///< p×p: the covariance C becomes C + C·M·C
@@ -113,9 +114,8 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
                                      const Eigen::MatrixXd& V, const Eigen::MatrixXd& X,
                                      const Eigen::MatrixXd& C);
 /// C with the allowances of all records, whose noise is independent, at most doubled by them, and
-/// every standard uncertainty
-/// with that of Student's t for its degrees of freedom ν = 2·C²/var C, by √(ν/(ν − 2))
-/// (Satterthwaite; JCGM 101:2008, 6.4.9.4).
+/// every standard uncertainty with that of Student's t for its degrees of freedom ν = 2·C²/var C,
+/// by √(ν/(ν − 2)) (Satterthwaite; JCGM 101:2008, 6.4.9.4).
 Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
                                const std::vector<PowersAllowance>& allowances);
 
