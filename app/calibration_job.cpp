@@ -206,12 +206,8 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
     return fail(good.error());
   }
   if (!job.verification.poses.empty()) {
-    const CertifiedModel model{.twelve = calibration.estimates.batch_ls,
-                               .final = calibration.final.batch_ls,
-                               .effects = calibration.diagnosis.effects,
-                               .unlisted = calibration.diagnosis.unlisted,
-                               .own_effects = job.own_effects};
-    outcome.verification = evaluate(model, job.verification, job.description);
+    outcome.verification = evaluate(certified_model(calibration, job.own_effects), job.verification,
+                                    job.description, BetweenSets::nowhere);
   }
 
   if (auto done = write_results(job, outcome, *folder); !done) return fail(done.error());

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/effects/visit_log.h"
 #include "estimator/measurement.h"
 #include "estimator/noise/noise_model.h"
 #include "estimator/uncertainty/monte_carlo.h"
@@ -133,6 +134,7 @@ struct Diagnosis {
   std::vector<FoundEffect> effects;
   std::vector<UnlistedStructure> unlisted;
   std::vector<DetectionLimit> not_found;  ///< every effect that could have been found and was not
+  RunHistory history;                     ///< where something was found that remembers it
 };
 
 /// Input-referred errors in m/s² (volts / K_ii · g_n).
@@ -240,10 +242,15 @@ struct CertifiedModel {
   TriadEstimate final;   ///< together with the effects
   std::vector<FoundEffect> effects;
   std::vector<UnlistedStructure> unlisted;
+  RunHistory history;                                           ///< of the calibration run
   std::vector<std::shared_ptr<const Effect>> own_effects = {};  ///< that `effects` may name
 };
+CertifiedModel certified_model(const Calibration& calibration,
+                               const std::vector<std::shared_ptr<const Effect>>& own_effects = {});
 
+/// Where its times say that the set followed the calibration run, effects that remember what came
+/// before go on from there; `head`: how it came to the first pose of the set.
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
-                    const RunDescription& description);
+                    const RunDescription& description, BetweenSets head = BetweenSets::anywhere);
 
 }  // namespace plumbline

@@ -28,8 +28,18 @@ EvaluationFigures figures(const TriadEstimate& model, const PerAxis<Eigen::Vecto
 
 }  // namespace
 
+CertifiedModel certified_model(const Calibration& calibration,
+                               const std::vector<std::shared_ptr<const Effect>>& own_effects) {
+  return {.twelve = calibration.estimates.batch_ls,
+          .final = calibration.final.batch_ls,
+          .effects = calibration.diagnosis.effects,
+          .unlisted = calibration.diagnosis.unlisted,
+          .history = calibration.diagnosis.history,
+          .own_effects = own_effects};
+}
+
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
-                    const RunDescription& description) {
+                    const RunDescription& description, BetweenSets head) {
   const std::vector<PoseMean> poses = pose_means(set);
   Evaluation result;
   result.poses = poses.size();
@@ -41,10 +51,13 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   }
   result.before = figures(model.twelve, twelve_V, set, poses);
 
-  const VisitLog log = make_visit_log(set, description);
+  VisitLog log = make_visit_log(set, description);
+  put_in_front(model.history, head, log);
   std::vector<std::shared_ptr<const Effect>> owned;
   const EnlargedParameters enlarged = restore_model(model, log, owned);
-  result.after = figures(model.final, predict_means_V(log, enlarged), set, poses);
+  PerAxis<Eigen::VectorXd> enlarged_V = predict_means_V(log, enlarged);
+  for (Eigen::VectorXd& axis : enlarged_V) axis = axis.tail(std::ssize(poses)).eval();
+  result.after = figures(model.final, enlarged_V, set, poses);
   return result;
 }
 

@@ -112,6 +112,8 @@ class OwnEffect final : public Effect {
     columns_ = first->column_name;
     within_dwell_ = first->uses(kTimeInPose);
     uses_temperature_ = first->uses(kTemperature);
+    for (std::size_t v = kPrevDelta; v < kVariables; ++v)
+      remembers_ |= first->uses(static_cast<Variable>(v));
     idle_.push_back(std::move(first));
   }
 
@@ -158,6 +160,7 @@ class OwnEffect final : public Effect {
     const auto value_at = [&](double since_s) { return angle_rad(log, visit, p, since_s); };
     return {angle(), effect::since_arrival_s(log.visits[visit]).unaryExpr(value_at).matrix()};
   }
+  bool remembers() const override { return remembers_; }
   std::string definition() const override;
   const std::vector<std::string>& columns() const { return columns_; }
   bool uses_temperature() const { return uses_temperature_; }
@@ -230,7 +233,7 @@ class OwnEffect final : public Effect {
     Lease lease(*this);
     Evaluator& evaluator = lease.get();
     auto& v = evaluator.variable;
-    const std::size_t before = visit == 0 ? 0 : visit - 1;
+    const std::size_t before = log.before(visit) == nullptr ? visit : visit - 1;
     const Visit& at = log.visits[visit];
     const Visit& from = log.visits[before];
     const auto force = [&](std::size_t k) -> Eigen::Vector3d {
@@ -243,7 +246,7 @@ class OwnEffect final : public Effect {
     v[kTime] = at.t_arrival_s + since_arrival_s;
     v[kTimeInPose] = since_arrival_s;
     v[kTemperature] = reference_C_ + at.temperature_K;
-    v[kPose] = static_cast<double>(visit);
+    v[kPose] = static_cast<double>(visit) - static_cast<double>(log.earlier);
     v[kPrevDelta] = from.delta_rad * kDegrees;
     v[kPrevH] = from.h_rad * kDegrees;
     for (Eigen::Index i = 0; i < 3; ++i) {
@@ -299,6 +302,7 @@ class OwnEffect final : public Effect {
   std::vector<std::string> columns_;
   bool within_dwell_ = false;
   bool uses_temperature_ = false;
+  bool remembers_ = false;
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<Evaluator>> idle_;
 };

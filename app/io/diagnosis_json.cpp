@@ -1,5 +1,7 @@
 #include "app/io/diagnosis_json.h"
 
+#include <numbers>
+
 namespace plumbline::app {
 
 namespace {
@@ -54,6 +56,27 @@ Json to_json(const DetectionLimit& limit) {
           {"unit", limit.unit}};
 }
 
+Json to_json(const RunHistory& history) {
+  constexpr double kDegPerRad = 180 / std::numbers::pi;
+  const auto column = [&](const auto& value) {
+    std::vector<double> values;
+    for (const Visit& visit : history.visits) values.push_back(value(visit));
+    return json_numbers(values);
+  };
+  Json covariates = Json::object();
+  for (std::size_t c = 0; c < history.covariate_names.size(); ++c)
+    covariates[history.covariate_names[c]] =
+        column([c](const Visit& visit) { return visit.covariate[c]; });
+  Json json = {
+      {"t_s", column([](const Visit& visit) { return visit.t_mean_s; })},
+      {"delta_deg", column([](const Visit& visit) { return kDegPerRad * visit.delta_rad; })},
+      {"h_deg", column([](const Visit& visit) { return kDegPerRad * visit.h_rad; })},
+      {"covariates", std::move(covariates)}};
+  if (history.has_temperature)
+    json["above_reference_K"] = column([](const Visit& visit) { return visit.temperature_K; });
+  return json;
+}
+
 }  // namespace
 
 Json json_diagnosis(const Diagnosis& diagnosis) {
@@ -80,6 +103,7 @@ Json json_diagnosis(const Diagnosis& diagnosis) {
     for (const DetectionLimit& limit : diagnosis.not_found) limits.push_back(to_json(limit));
     json["detection_limits"] = std::move(limits);
   }
+  if (!diagnosis.history.visits.empty()) json["history"] = to_json(diagnosis.history);
   return json;
 }
 

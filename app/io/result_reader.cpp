@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "app/config/own_effects.h"
 #include "app/io/read_file.h"
@@ -83,6 +84,26 @@ UnlistedStructure unlisted_structure(const Json& json) {
   return structure;
 }
 
+RunHistory run_history(const Json& json) {
+  constexpr double kRadPerDeg = std::numbers::pi / 180;
+  RunHistory history;
+  history.has_temperature = json.contains("above_reference_K");
+  for (const auto& [name, values] : json.at("covariates").items())
+    history.covariate_names.push_back(name);
+  for (std::size_t k = 0; k < json.at("t_s").size(); ++k) {
+    Visit visit;
+    visit.t_mean_s = json.at("t_s").at(k).get<double>();
+    visit.delta_rad = kRadPerDeg * json.at("delta_deg").at(k).get<double>();
+    visit.h_rad = kRadPerDeg * json.at("h_deg").at(k).get<double>();
+    if (history.has_temperature)
+      visit.temperature_K = json.at("above_reference_K").at(k).get<double>();
+    for (const std::string& name : history.covariate_names)
+      visit.covariate.push_back(json.at("covariates").at(name).at(k).get<double>());
+    history.visits.push_back(std::move(visit));
+  }
+  return history;
+}
+
 StoredCalibration stored_calibration(const Json& json, double reference_C) {
   if (const auto schema = json.at("schema").get<std::string>(); schema != "plumbline.result/1") {
     throw std::invalid_argument(
@@ -102,6 +123,8 @@ StoredCalibration stored_calibration(const Json& json, double reference_C) {
   for (const Json& structure : json.at("diagnosis").at("unlisted")) {
     stored.model.unlisted.push_back(unlisted_structure(structure));
   }
+  if (json.at("diagnosis").contains("history"))
+    stored.model.history = run_history(json.at("diagnosis").at("history"));
   const Json& dut = json.at("provenance").at("dut");
   stored.dut.serial = dut.at("serial").get<std::string>();
   stored.dut.model = dut.at("model").get<std::string>();

@@ -39,6 +39,13 @@ ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& 
   return active;
 }
 
+ActiveEffect with_shapes_held(ActiveEffect active) {
+  const auto infos = active.effect->parameters();
+  for (std::size_t k = 0; k < infos.size(); ++k)
+    if (infos[k].role == ParameterRole::shape) active.free[k] = false;
+  return active;
+}
+
 Eigen::Index EnlargedParameters::free_count() const {
   Eigen::Index count = 4 * kAxes;
   for (const ActiveEffect& active : effects) {
@@ -441,12 +448,8 @@ EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed
   EnlargedFit fit = fit_enlarged(log, observed, whitening, start);
   if (fit.determined) return fit;
   EnlargedParameters held = fit.parameters;
-  for (std::size_t e = first_new; e < held.effects.size(); ++e) {
-    ActiveEffect& newcomer = held.effects[e];
-    const auto infos = newcomer.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (infos[k].role == ParameterRole::shape) newcomer.free[k] = false;
-  }
+  for (std::size_t e = first_new; e < held.effects.size(); ++e)
+    held.effects[e] = with_shapes_held(held.effects[e]);
   return fit_enlarged(log, observed, whitening, held);
 }
 

@@ -22,6 +22,8 @@ struct ActiveEffect {
 std::vector<std::size_t> axes_of(const ActiveEffect& active);
 /// Free are the amplitudes that are not zero and the shapes; indices stay.
 ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis);
+/// The same with its shapes as they are.
+ActiveEffect with_shapes_held(ActiveEffect active);
 
 /// All parameters of the enlarged model.
 struct EnlargedParameters {

@@ -204,6 +204,9 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);
+  if (std::any_of(found.fit.parameters.effects.begin(), found.fit.parameters.effects.end(),
+                  [](const ActiveEffect& active) { return active.effect->remembers(); }))
+    diagnosis.history = history_of(log);
 
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
   EnlargedParameters bare = found.fit.parameters;

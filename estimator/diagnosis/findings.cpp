@@ -116,6 +116,14 @@ std::string describe(const FoundEffect& effect) {
   return text;
 }
 
+std::string describe(const UnlistedStructure& structure) {
+  std::string text =
+      "unlisted: " + structure.driver + " changes the " + structure.form + " (" + structure.shape;
+  for (const EffectParameter& p : structure.parameters)
+    if (p.name == "tau") text += ", time constant " + number(p.value, "%.3g") + " s";
+  return text + ")";
+}
+
 /// The same weakness of several axes is one effect with several axes, and so are several poses that
 /// went wrong each by itself.
 bool shares_an_entry(const Effect& effect) {
@@ -208,8 +216,7 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
   }
   for (const UnlistedStructure& structure : diagnosis.unlisted) {
     diagnosis.reason += (diagnosis.reason.empty() ? "" : "; ");
-    diagnosis.reason += "unlisted: " + structure.driver + " changes the " + structure.form + " (" +
-                        structure.shape + ")";
+    diagnosis.reason += describe(structure);
   }
   return diagnosis;
 }

@@ -72,7 +72,15 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
     const Candidate& candidate = list.candidates[ranked[k].candidate];
     Before compared{all_of(plain), &rich.noise, &rich};
     compared.known[candidate.axis] = nullptr;
-    stages[k] = settle(input, with_effect(model, candidate.active()), compared);
+    // So little is known of a slow effect that a time constant would run away before the amplitude
+    // is known, and sometimes after.
+    const ActiveEffect active = candidate.active();
+    stages[k] = settle(input, with_effect(model, with_shapes_held(active)), compared);
+    EnlargedParameters freed = stages[k].fit.parameters;
+    if (!stages[k].fit.determined || freed.effects.back().free == active.free) return;
+    freed.effects.back().free = active.free;
+    Stage with = settle(input, freed, compared);
+    if (with.fit.determined) stages[k] = std::move(with);
   });
   std::optional<SlowFinding> best;
   std::pair best_score{true, std::numeric_limits<double>::infinity()};

@@ -38,19 +38,6 @@ std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& v
   return rate;
 }
 
-// Average of the past with weight exp(−age/τ). Between two visits a column is taken to change
-// evenly, an attitude to be the earlier one.
-std::vector<double> remembered(const VisitLog& log, const std::vector<double>& value, double tau_s,
-                               bool attitude) {
-  std::vector<double> state(value.size(), value.empty() ? 0 : value.front());
-  for (std::size_t k = 1; k < value.size(); ++k) {
-    const double kept = std::exp(-(log.visits[k].t_mean_s - log.visits[k - 1].t_mean_s) / tau_s);
-    const double between = attitude ? value[k - 1] : 0.5 * (value[k - 1] + value[k]);
-    state[k] = kept * state[k - 1] + (1 - kept) * between;
-  }
-  return state;
-}
-
 struct Column {
   std::string name;
   std::vector<double> value;
@@ -90,19 +77,20 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   PerAxis<std::vector<double>> a_g, before_g;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     a_g[i] = specific_force_component_g(log, i);
-    before_g[i] = a_g[i];
-    std::rotate(before_g[i].rbegin(), before_g[i].rbegin() + 1, before_g[i].rend());
-    if (!before_g[i].empty()) before_g[i].front() = a_g[i].front();
+    for (std::size_t k = 0; k < a_g[i].size(); ++k)
+      before_g[i].push_back(a_g[i][log.before(k) ? k - 1 : k]);
     drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g[i], a_g[i], a_g[i]}});
     drivers.back().in_the_twelve = true;
   }
   drivers.push_back({"previous_pose", "a_i there", before_g});
   add("previous_pose", [&](std::size_t k) {
-    if (k == 0) return 0.0;
-    return std::remainder(visits[k].delta_rad - visits[k - 1].delta_rad, 2 * std::numbers::pi);
+    const Visit* before = log.before(k);
+    return before ? std::remainder(visits[k].delta_rad - before->delta_rad, 2 * std::numbers::pi)
+                  : 0.0;
   }).past = "turn of delta since";
   add("previous_pose", [&](std::size_t k) {
-    return k == 0 ? 0.0 : visits[k].h_rad - visits[k - 1].h_rad;
+    const Visit* before = log.before(k);
+    return before ? visits[k].h_rad - before->h_rad : 0.0;
   }).past = "change of h since";
   for (const Column& column : recorded_columns(log)) {
     add(column.name, [&](std::size_t k) { return column.value[k]; }).recorded = true;
@@ -116,29 +104,6 @@ Driver load(const VisitLog& log) {
   Driver driver{"previous_pose", "", {}};
   for (std::size_t i = 0; i < kAxisCount; ++i) driver.value[i] = specific_force_component_g(log, i);
   return driver;
-}
-
-std::vector<Driver> remembered_drivers(const VisitLog& log) {
-  std::vector<Driver> drivers;
-  PerAxis<std::vector<double>> a_g;
-  for (std::size_t i = 0; i < kAxisCount; ++i) a_g[i] = specific_force_component_g(log, i);
-  const std::vector<Column> columns = recorded_columns(log);
-  for (const double tau_s : kMemory_s) {
-    const std::string constant = "time constant " + std::to_string(static_cast<int>(tau_s)) + " s";
-    const std::string past = "average of the past, " + constant;
-    Driver& attitude = drivers.emplace_back(Driver{"previous_pose", past, {}});
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      attitude.value[i] = remembered(log, a_g[i], tau_s, true);
-    for (const Column& column : columns) {
-      const std::vector<double> value = remembered(log, column.value, tau_s, false);
-      drivers.push_back({column.name, past, {value, value, value}, false, true});
-      // Slopes between neighbours drown in the noise of what was recorded.
-      std::vector<double> rise = column.value;
-      for (std::size_t k = 0; k < rise.size(); ++k) rise[k] -= value[k];
-      drivers.push_back({column.name + ".rate", past, {rise, rise, rise}, false, true});
-    }
-  }
-  return drivers;
 }
 
 }  // namespace plumbline

@@ -30,14 +30,7 @@ struct Driver {
 /// change.
 std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 
-/// The specific force of the own axis, under the name of what came before: for what follows it with
-/// a play.
+/// The specific force of the own axis, under the name of what came before: for what follows it.
 Driver load(const VisitLog& log);
-
-/// What recorded columns and the specific force of the own axis were on average lately, weighted by
-/// exp(−age/τ), for the time constants of kMemory_s.
-std::vector<Driver> remembered_drivers(const VisitLog& log);
-inline constexpr double kMemory_s[] = {30,  42,  60,  85,   120,  170,  230,  300,
-                                       420, 600, 850, 1200, 1700, 2400, 3400, 4800};
 
 }  // namespace plumbline

@@ -42,6 +42,7 @@ class DwellCourse final : public SmoothTerm {
     return words;
   }
   Subject subject() const override { return Subject::sensor; }
+  bool remembers() const override { return of_ == CourseOf::step; }
   bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     std::vector<ParameterInfo> infos;
@@ -69,7 +70,7 @@ class DwellCourse final : public SmoothTerm {
       case CourseOf::component:
         return input.a();
       case CourseOf::step: {
-        if (input.visit == 0) return 0;
+        if (input.log.before(input.visit) == nullptr) return 0;
         return input.a_g[input.visit - 1](static_cast<Eigen::Index>(input.axis)) - input.a();
       }
     }

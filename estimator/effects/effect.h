@@ -92,6 +92,8 @@ class Effect {
   virtual Eigen::VectorXd course_g(const TermInput& input, const double* p) const;
   /// Head, within the dwell: that of which displace() adds the mean.
   virtual AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const;
+  /// Whether it depends on earlier visits, or on what was recorded then.
+  virtual bool remembers() const { return false; }
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&) const { return false; }
   /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.

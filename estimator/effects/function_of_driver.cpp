@@ -29,6 +29,9 @@ class FunctionOfDriver : public SmoothTerm {
   Subject subject() const override {
     return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
   }
+  bool remembers() const override {
+    return !driver_->past.empty() || driver_->name.ends_with(".rate");
+  }
   void displace(const VisitLog&, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     head.*target_.angle += of_visit(0, visit, p) * effect::kRadPerDeg;
@@ -36,9 +39,7 @@ class FunctionOfDriver : public SmoothTerm {
   double term_g(const TermInput& input, const double* p) const override {
     const double f = driver_->output_of == input.axis ? at(input.output_V, p)
                                                       : of_visit(input.axis, input.visit, p);
-    if (target_.form != TermForm::scale) return f;
-    return f * component_g(input, target_.other) *
-           (target_.second ? component_g(input, *target_.second) : 1);
+    return f * target_.factor(input);
   }
 
  protected:
@@ -62,9 +63,6 @@ class FunctionOfDriver : public SmoothTerm {
   bool is_in_the_twelve() const { return driver_->in_the_twelve && target_.form == TermForm::bias; }
 
  private:
-  static double component_g(const TermInput& input, std::size_t other) {
-    return input.a_g[input.visit](static_cast<Eigen::Index>((input.axis + other) % kAxisCount));
-  }
   static std::pair<double, double> range_of(const PerAxis<std::vector<double>>& of_axis) {
     constexpr double kBeyond = std::numeric_limits<double>::infinity();
     std::pair<double, double> range{kBeyond, -kBeyond};
@@ -106,14 +104,7 @@ class Polynomial final : public FunctionOfDriver {
     return "polynomial of degree " + std::to_string(degree_);
   }
   double at(double value, const double* p) const override {
-    const double x = std::clamp((2 * value - p[0] - p[1]) / (p[1] - p[0]), -1.0, 1.0);
-    // Bonnet's recursion.
-    double before = 1, now = x, sum = p[2] * x;
-    for (int d = 2; d <= degree_; ++d) {
-      before = std::exchange(now, ((2 * d - 1) * x * now - (d - 1) * before) / d);
-      sum += p[d + 1] * now;
-    }
-    return sum;
+    return legendre_series(value, p[0], p[1], p + 2, degree_);
   }
 
   int degree_;
@@ -338,10 +329,45 @@ class Bend final : public FunctionOfDriver {
   }
 };
 
+class Step final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    // A width is not differentiated: hardly a reading lies in the edge of a sharp step.
+    return {place("at"),
+            {"width", "", ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 12;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : {0.01, 0.04})
+      for (int k = 1; k < kParts; ++k)
+        starts.push_back(
+            {{low + (high - low) * k / kParts, share * (high - low), target().typical_size()}});
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, const Hypothesis& found) const override {
+    std::vector<Hypothesis> others;
+    for (const double ratio : {0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0})
+      others.push_back({{found.p[0], ratio * found.p[1], found.p[2]}});
+    return others;
+  }
+
+ private:
+  std::string function() const override { return "step"; }
+  double at(double value, const double* p) const override {
+    return p[2] / (1 + std::exp((p[0] - value) / p[1]));
+  }
+};
+
 class PlayLag final : public FunctionOfDriver {
  public:
   using FunctionOfDriver::FunctionOfDriver;
 
+  bool remembers() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
   }
@@ -389,6 +415,29 @@ double Target::typical_size() const {
   return form == TermForm::geometry ? effect::kSmallAngle_deg : effect::kSmallTerm;
 }
 
+double Target::factor(const TermInput& input) const {
+  const auto component_g = [&](std::size_t next) {
+    return input.a_g[input.visit](static_cast<Eigen::Index>((input.axis + next) % kAxisCount));
+  };
+  if (form != TermForm::scale) return 1;
+  return component_g(other) * (second ? component_g(*second) : 1);
+}
+
+double legendre_series(double value, double low, double high, const double* c, int degree) {
+  constexpr int kContinued = 2;  // the end slope of a higher degree is too uncertain
+  const double position = (2 * value - low - high) / (high - low);
+  const double x = std::clamp(position, -1.0, 1.0);
+  // Bonnet's recursion.
+  double before = 1, now = x, sum = c[0] * x;
+  for (int d = 2; d <= degree; ++d) {
+    before = std::exchange(now, ((2 * d - 1) * x * now - (d - 1) * before) / d);
+    sum += c[d - 1] * now;
+  }
+  if (position == x || degree > kContinued) return sum;
+  const double end_slope = c[0] + (degree == 2 ? 3 * x * c[1] : 0);
+  return sum + end_slope * (position - x);
+}
+
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree) {
   return std::make_unique<Polynomial>(std::move(driver), target, degree);
 }
@@ -407,6 +456,9 @@ std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
 }
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
   return std::make_unique<Bend>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target) {
+  return std::make_unique<Step>(std::move(driver), target);
 }
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
   return std::make_unique<PlayLag>(std::move(driver), target);

@@ -24,14 +24,20 @@ struct Target {
   std::string words() const;
   const char* unit() const;
   double typical_size() const;
+  /// What the function is multiplied with: for a scale the components, g or g².
+  double factor(const TermInput& input) const;
 };
+
+/// Σ c_d·P_d, d = 1 … degree, of the range from low to high; beyond it straight on up to degree 2,
+/// and held above that.
+double legendre_series(double value, double low, double high, const double* c, int degree);
 
 /// Numbers of cycles in the range of a driver: least, least + step … most.
 struct Cycles {
   double least, step, most;
 };
 
-/// Legendre polynomials of degree 1 … `degree` over the range that was seen, held beyond it.
+/// legendre_series() over the range that was seen.
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree);
 /// Harmonics of order 1 … `order` of an angle.
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order);
@@ -45,6 +51,8 @@ std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
 /// Nothing on one side of an unknown value, proportional to the distance from it on the other.
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
+/// From nothing to all of it about an unknown value, sharply or gradually (logistic function).
+std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target);
 /// What follows the driver through a play of unknown width lags behind it by this function.
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
 

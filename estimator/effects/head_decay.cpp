@@ -28,6 +28,7 @@ class HeadDecay final : public SmoothTerm {
     return words;
   }
   Subject subject() const override { return Subject::head; }
+  bool remembers() const override { return of_ == DecayOf::way; }
   bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     // true_at 0: the angle is right in the end; 1: it was right on arrival.
@@ -67,11 +68,11 @@ class HeadDecay final : public SmoothTerm {
       case DecayOf::weight:
         return p[0] * std::cos(at.h_rad) * effect::kRadPerDeg;
       case DecayOf::way: {
-        if (visit == 0) return 0;
-        const Visit& before = log.visits[visit - 1];
+        const Visit* before = log.before(visit);
+        if (before == nullptr) return 0;
         return p[0] * (is_delta()
-                           ? std::remainder(before.delta_rad - at.delta_rad, effect::kTurn_rad)
-                           : before.h_rad - at.h_rad);
+                           ? std::remainder(before->delta_rad - at.delta_rad, effect::kTurn_rad)
+                           : before->h_rad - at.h_rad);
       }
     }
     return p[0] * effect::kRadPerDeg;

@@ -15,6 +15,7 @@ class Backlash final : public Effect {
  public:
   std::string id() const override { return "rig.backlash"; }
   Subject subject() const override { return Subject::head; }
+  bool remembers() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     // way 0: the head goes the shorter way round; 1: it never passes 360°. start: how it came to
     // its first angle: 0 with no play, 1 from δ = 0, 2 as in the first turn. Nothing recorded says

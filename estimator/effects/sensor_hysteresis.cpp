@@ -10,6 +10,7 @@ class Hysteresis final : public Effect {
  public:
   std::string id() const override { return "sensor.hysteresis"; }
   Subject subject() const override { return Subject::sensor; }
+  bool remembers() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     // start: how the head came to its first pose, which nothing recorded says: 0 without a trace,
     // 1 from δ = h = 0.
@@ -19,8 +20,9 @@ class Hysteresis final : public Effect {
     return {{{effect::kSmallTerm, 0}}, {{effect::kSmallTerm, 1}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
-    const bool from_zero = input.visit == 0 && p[1] > 0.5;
-    if (input.visit == 0 && !from_zero) return 0;
+    const bool unknown = input.log.before(input.visit) == nullptr;
+    const bool from_zero = unknown && p[1] > 0.5;
+    if (unknown && !from_zero) return 0;
     const auto i = static_cast<Eigen::Index>(input.axis);
     const double before_g =
         from_zero ? Eigen::Vector3d(input.log.gamma, 0, 0)(i) : input.a_g[input.visit - 1](i);

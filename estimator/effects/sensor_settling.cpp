@@ -26,6 +26,7 @@ class Settling final : public Effect {
   double term_g(const TermInput& input, const double* p) const override {
     return p[0] * came_from_g(input) * effect::mean_decay(input.at(), input.at().t_arrival_s, p[1]);
   }
+  bool remembers() const override { return true; }
   bool within_dwell() const override { return true; }
   Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
     return p[0] * came_from_g(input) * (-effect::since_arrival_s(input.at()) / p[1]).exp().matrix();
@@ -33,7 +34,7 @@ class Settling final : public Effect {
 
  private:
   static double came_from_g(const TermInput& input) {
-    if (input.visit == 0) return 0;
+    if (input.log.before(input.visit) == nullptr) return 0;
     const auto i = static_cast<Eigen::Index>(input.axis);
     return input.a_g[input.visit - 1](i) - input.a_g[input.visit](i);
   }

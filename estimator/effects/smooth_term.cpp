@@ -7,6 +7,7 @@
 #include "estimator/effects/dwell_course.h"
 #include "estimator/effects/function_of_driver.h"
 #include "estimator/effects/head_decay.h"
+#include "estimator/effects/memory_term.h"
 
 namespace plumbline {
 
@@ -84,6 +85,8 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
       add(bend(driver, scale));
     }
     if (driver->recorded && !rate) {
+      add(step(driver, bias));
+      add(step(driver, scale));
       add(play(driver, bias));
       add(play(driver, scale));
     }
@@ -106,17 +109,7 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   for (const Target& target : {of_delta, of_h, of_skew}) add(wave(turn, target, {0.2, 0.2, 6}));
   const auto attitude = std::make_shared<const Driver>(load(log));
   if (any || attitude->varies()) add(play(attitude, bias));
-  const double span_s = log.last_s() - log.first_s();
-  const double step_s = span_s / std::max<double>(1, static_cast<double>(log.visits.size()) - 1);
-  std::size_t index = 0;
-  std::vector<Driver> remembered = remembered_drivers(log);
-  const std::size_t per_tau = remembered.size() / std::size(kMemory_s);
-  for (Driver& each : remembered) {
-    const double tau_s = kMemory_s[index++ / per_tau];
-    const auto driver = std::make_shared<const Driver>(std::move(each));
-    if (!any && (tau_s < step_s || tau_s > span_s / 2 || !driver->varies())) continue;
-    for (const Target& target : {bias, scale}) add_polynomials(driver, target, {1, 2});
-  }
+  for (auto& term : memory_terms(log)) add(std::move(term));
   // What repeats from step to step, or every second step, is the rounding itself, or a bit.
   constexpr double kShortestWave = 2.5;  // steps
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {

@@ -109,6 +109,15 @@ Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<Dwe
   return contrasts;
 }
 
+namespace {
+
+std::array<int, 2> direction_of_arrival(const VisitLog& log, std::size_t visit) {
+  const Visit* before = log.before(visit);
+  return before ? direction_after(*before, log.visits[visit].delta_rad) : std::array<int, 2>{};
+}
+
+}  // namespace
+
 std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
   constexpr double kStill_rad = 1e-9;  // degrees that became radians and came back
   std::array<int, 2> direction = before.delta_direction;
@@ -117,6 +126,39 @@ std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
   for (std::size_t way = 0; way < direction.size(); ++way)
     if (std::abs(turn[way]) > kStill_rad) direction[way] = turn[way] > 0 ? 1 : -1;
   return direction;
+}
+
+RunHistory history_of(const VisitLog& log) {
+  return {log.has_temperature, log.covariate_names, log.visits};
+}
+
+void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log) {
+  if (history.visits.empty() || history.visits.back().t_mean_s >= log.first_s()) return;
+  if (log.has_temperature && !history.has_temperature) return;
+  std::vector<std::size_t> column;  // of the log in the history
+  for (const std::string& name : log.covariate_names) {
+    const auto& known = history.covariate_names;
+    column.push_back(
+        static_cast<std::size_t>(std::find(known.begin(), known.end(), name) - known.begin()));
+    if (column.back() == known.size()) return;
+  }
+  std::vector<Visit> all;
+  for (const Visit& earlier : history.visits) {
+    Visit visit = log.visits.front();
+    visit.t_mean_s = earlier.t_mean_s;
+    visit.t_arrival_s = visit.t_mean_s - 0.5 * visit.step_s * static_cast<double>(visit.count - 1);
+    visit.delta_rad = earlier.delta_rad;
+    visit.h_rad = earlier.h_rad;
+    visit.temperature_K = earlier.temperature_K;
+    for (std::size_t c = 0; c < column.size(); ++c)
+      visit.covariate[c] = earlier.covariate[column[c]];
+    all.push_back(std::move(visit));
+  }
+  log.visits.insert(log.visits.begin(), all.begin(), all.end());
+  log.earlier = all.size();
+  log.moved_since = head == BetweenSets::anywhere;
+  for (std::size_t k = 0; k < log.visits.size(); ++k)
+    log.visits[k].delta_direction = direction_of_arrival(log, k);
 }
 
 double VisitLog::step_V(std::size_t axis) const {
@@ -156,13 +198,12 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     if (log.has_temperature) {
       visit.temperature_K = mean_of(samples.temp_C, pose) - description.reference_C;
     }
-    if (!log.visits.empty())
-      visit.delta_direction = direction_after(log.visits.back(), visit.delta_rad);
     for (const Covariate& covariate : samples.covariates) {
       visit.covariate.push_back(mean_of(covariate.value, pose));
     }
     for (std::size_t i = 0; i < kAxisCount; ++i) visit.mean_V[i] = mean_of(samples.u_V[i], pose);
     log.visits.push_back(std::move(visit));
+    log.visits.back().delta_direction = direction_of_arrival(log, log.visits.size() - 1);
   }
   parallel_for(kAxisCount, [&](std::size_t i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);

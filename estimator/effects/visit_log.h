@@ -52,6 +52,15 @@ struct VisitLog {
   /// zero. The first are step_contrasts(); then come sine and cosine of every line.
   std::map<std::size_t, Eigen::MatrixXd> contrasts;
 
+  /// Visits in front that belong to an earlier set, and whether the head stood elsewhere since.
+  std::size_t earlier = 0;
+  bool moved_since = false;
+
+  /// Where the head came from; null where nothing recorded says so.
+  const Visit* before(std::size_t visit) const {
+    const bool unknown = visit == 0 || (visit == earlier && moved_since);
+    return unknown ? nullptr : &visits[visit - 1];
+  }
   /// How many numbers describe the course of a dwell beside its mean.
   Eigen::Index dwell_contrasts() const { return contrasts.begin()->second.cols(); }
 
@@ -62,6 +71,23 @@ struct VisitLog {
   double first_s() const { return visits.front().t_arrival_s; }
   double last_s() const { return visits.back().t_mean_s; }
 };
+
+/// An earlier run of the same unit, as far as effects remember it: of its visits t_mean_s, the
+/// angles, temperature and covariates.
+struct RunHistory {
+  bool has_temperature = false;
+  std::vector<std::string> covariate_names;  ///< in the order of Visit::covariate
+  std::vector<Visit> visits;
+};
+RunHistory history_of(const VisitLog& log);
+
+/// Where the head went between two sets.
+enum class BetweenSets { nowhere, anywhere };
+
+/// Puts the visits of an earlier set in front of the log's own, so that effects that remember them
+/// go on where they were. Nothing is done where they were not earlier on the same clock or lack a
+/// column of the log.
+void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log);
 
 /// Visit::delta_direction of a visit at `delta_rad` that comes next after `before`.
 std::array<int, 2> direction_after(const Visit& before, double delta_rad);

@@ -21,7 +21,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 constexpr Index kVariances = 4;         // Q N B K
 constexpr double kTwoSided95 = 3.8415;  // χ²₁
 constexpr double kOneSided95 = 2.7055;
@@ -259,7 +259,7 @@ double value_step(const std::vector<double>& record) {
   values.erase(std::unique(values.begin(), values.end()), values.end());
   if (values.size() < 2 || values.size() * 4 > record.size()) return 0;
   // The smallest difference, made precise by ever longer multiples of it.
-  double step = kInfinity;
+  double step = kUnbounded;
   const double noise = 1e-9 * (values.back() - values.front());
   for (std::size_t i = 1; i < values.size(); ++i)
     if (values[i] - values[i - 1] > noise) step = std::min(step, values[i] - values[i - 1]);
@@ -285,7 +285,7 @@ RecordTerms describe_record(const LineSearch& search, const std::vector<double>&
   result.band_hz = find_band_hz(search.spectrum, rate_hz, search.masked);
   const bool rolls_off = result.band_hz < 0.49 * rate_hz;
   const SpectrumSums whole = gather_spectrum(search.spectrum, rate_hz, search.masked,
-                                             rolls_off ? result.band_hz : kInfinity);
+                                             rolls_off ? result.band_hz : kUnbounded);
   SpectrumSums sums = whole;
   TermChoice choice = choose_terms(sums, !rolls_off);
   Misfit all = misfit_of(sums, choice.chosen);

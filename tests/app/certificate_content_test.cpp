@@ -273,11 +273,10 @@ TEST(Certificate, UkrainianForWhatTheCoreSays) {
   EXPECT_EQ(uk.phrase("17 poses are too few to tell an effect from noise; at least 24 are needed"),
             "положень (17) замало, щоб відрізнити ефект від шуму; потрібно щонайменше 24");
   EXPECT_EQ(uk.phrase("something new"), "something new");
-  EXPECT_EQ(
-      uk.phrase("unlisted: temp_C changes the scale (polynomial of degree 1 in the average of "
-                "the past, time constant 60 s, times the component of the next axis)"),
-      "поза переліком: temp_C змінює чутливість (многочлен степеня 1 від середнього минулого, "
-      "стала часу 60 s, помножено на складову наступної осі)");
+  EXPECT_EQ(uk.phrase("unlisted: temp_C changes the scale (straight line in the average of "
+                      "the past, times the component of the next axis, time constant 60 s)"),
+            "поза переліком: temp_C змінює чутливість (пряма від середнього минулого, "
+            "помножено на складову наступної осі, стала часу 60 s)");
   EXPECT_EQ(uk.phrase("1 further pose in random order (h from 10° to 10°) tells it from "
                       "rig.backlash by 7.1 standard deviations"),
             "ще одне положення у випадковому порядку (h від 10° до 10°) відрізнить його від "

@@ -56,6 +56,13 @@ Calibration some_calibration() {
                                      .parameters = {{"p1", 0, 0.001, 0.0001, "g"}},
                                      .p_value = 0.001,
                                      .heldout_gain = 0.5}};
+  Visit visit;
+  visit.t_mean_s = 2.5;
+  visit.delta_rad = 0.5;
+  visit.h_rad = 0.25;
+  visit.temperature_K = 1.5;
+  visit.covariate = {46, 5.01};
+  calibration.diagnosis.history = {true, {"rh_pct", "supply_V"}, {visit, visit}};
   calibration.decision = {.status = DecisionStatus::conditional_pass,
                           .limit_mps2 = 0.2,
                           .max_abs_error_mps2 = 0.19,
@@ -122,6 +129,15 @@ TEST(ResultJson, ReadsBackWhatEvaluateNeeds) {
   EXPECT_EQ(effect.parameters[0].axis, std::optional<std::size_t>(1));
   EXPECT_EQ(effect.parameters[1].axis, std::nullopt);
   EXPECT_EQ(effect.parameters[0].value, 0.0366);
+  const RunHistory& history = stored->model.history;
+  EXPECT_TRUE(history.has_temperature);
+  EXPECT_THAT(history.covariate_names, testing::ElementsAre("rh_pct", "supply_V"));
+  ASSERT_EQ(history.visits.size(), 2u);
+  EXPECT_EQ(history.visits[1].t_mean_s, 2.5);
+  EXPECT_NEAR(history.visits[1].delta_rad, 0.5, 1e-15);
+  EXPECT_NEAR(history.visits[1].h_rad, 0.25, 1e-15);
+  EXPECT_EQ(history.visits[1].temperature_K, 1.5);
+  EXPECT_THAT(history.visits[1].covariate, testing::ElementsAre(46, 5.01));
   EXPECT_EQ(stored->dut.serial, "A-0017");
 }
 

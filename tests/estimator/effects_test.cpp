@@ -11,20 +11,23 @@
 #include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
+#include "estimator/effects/function_of_driver.h"
 #include "estimator/effects/head_decay.h"
+#include "estimator/effects/smooth_term.h"
 #include "estimator/kinematics.h"
 
 namespace plumbline {
 namespace {
 
-// 12 × 5 positions visited in a snake, with a temperature and a humidity that move.
-VisitLog example_log() {
+// 12 × 5 positions visited in a snake, with a temperature and a humidity that move; visits `from`
+// to `to` alone.
+VisitLog example_log(int from = 0, int to = 60) {
   MeasurementSet set;
   set.samples.covariates.push_back({"rh_pct", {}});
   RunDescription description;
   description.gravity.local_mps2 = 9.81;
   description.adc = Adc{16, -5, 0};
-  for (int k = 0; k < 60; ++k) {
+  for (int k = from; k < to; ++k) {
     const int ring = k / 12, step = ring % 2 == 0 ? k % 12 : 11 - k % 12;
     set.poses.push_back({k, 30.0 * step, 20.0 * ring, set.samples.size(), 8});
     for (int i = 0; i < 8; ++i) {
@@ -210,6 +213,81 @@ TEST(VisitLog, ApproachesByTheShorterWayRound) {
   EXPECT_EQ(log.visits[1].delta_direction[0], 1);
   EXPECT_EQ(log.visits[2].delta_direction[0], 1);
   EXPECT_EQ(log.visits[3].delta_direction[0], -1);
+}
+
+/// Everything that remembers, on one log.
+struct Remembering {
+  VisitLog log;
+  std::vector<std::unique_ptr<SmoothTerm>> terms;
+  std::vector<const Effect*> effects;
+
+  explicit Remembering(VisitLog visits)
+      : log(std::move(visits)), terms(smooth_terms(log, SmoothTermSelection::any)) {
+    for (const Effect* effect : effect_catalogue())
+      if (effect->remembers()) effects.push_back(effect);
+    for (const auto& term : terms)
+      if (term->remembers()) effects.push_back(term.get());
+  }
+  PerAxis<Eigen::VectorXd> with(std::size_t effect, const Hypothesis& hypothesis) const {
+    EnlargedParameters model = twelve();
+    model.effects.push_back(activate(*effects[effect], 0, hypothesis));
+    return predict_means_V(log, model);
+  }
+};
+
+TEST(VisitLog, WhatIsRememberedGoesOnInASetThatFollows) {
+  constexpr int kSplit = 23, kAll = 60;
+  const Remembering whole(example_log());
+  VisitLog after = example_log(kSplit, kAll);
+  put_in_front(history_of(example_log(0, kSplit)), BetweenSets::nowhere, after);
+  const Remembering continued(std::move(after)), alone(example_log(kSplit, kAll));
+  ASSERT_EQ(whole.effects.size(), continued.effects.size());
+  ASSERT_GT(whole.effects.size(), 50U);
+  std::size_t told_apart = 0;
+  for (std::size_t e = 0; e < whole.effects.size(); ++e) {
+    SCOPED_TRACE(whole.effects[e]->id());
+    for (const Hypothesis& hypothesis : whole.effects[e]->hypotheses(whole.log, 0)) {
+      const auto expected = whole.with(e, hypothesis), got = continued.with(e, hypothesis);
+      const auto without = alone.with(e, hypothesis);
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        EXPECT_LT((expected[i] - got[i]).tail(kAll - kSplit).cwiseAbs().maxCoeff(), 1e-12);
+      told_apart += (expected[0].tail(kAll - kSplit) - without[0]).norm() > 1e-9 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(told_apart, 100U) << "hypotheses to which it makes no difference prove nothing";
+}
+
+TEST(VisitLog, NobodyKnowsWhereTheHeadWentBetweenTwoSets) {
+  VisitLog log = example_log(23, 60);
+  put_in_front(history_of(example_log(0, 23)), BetweenSets::anywhere, log);
+  EXPECT_EQ(log.earlier, 23U);
+  EXPECT_EQ(log.before(23), nullptr);
+  EXPECT_EQ(log.visits[23].delta_direction[0], 0);
+  EXPECT_EQ(log.before(24), &log.visits[23]);
+}
+
+TEST(VisitLog, AnotherClockOrAnotherRecordHasNoHistory) {
+  const VisitLog alone = example_log(0, 23);
+  VisitLog log = alone;
+  put_in_front(history_of(example_log(23, 60)), BetweenSets::nowhere, log);
+  EXPECT_EQ(log.visits.size(), alone.visits.size()) << "it came later";
+  RunHistory without_humidity = history_of(alone);
+  without_humidity.covariate_names = {"supply_V"};
+  log = example_log(23, 60);
+  put_in_front(without_humidity, BetweenSets::nowhere, log);
+  EXPECT_EQ(log.earlier, 0U);
+}
+
+TEST(LegendreSeries, GoesStraightOnBeyondTheRange) {
+  const double c[] = {0.5, 0.25, 0.125};
+  for (const double end : {-1.0, 1.0}) {
+    EXPECT_NEAR(legendre_series(3 * end, -1, 1, c, 1), 1.5 * end, 1e-15);
+    const double slope = 0.5 + 0.25 * 3 * end;
+    EXPECT_NEAR(legendre_series(2 * end, -1, 1, c, 2), 0.5 * end + 0.25 + slope * end, 1e-15);
+    EXPECT_EQ(legendre_series(2 * end, -1, 1, c, 3), legendre_series(end, -1, 1, c, 3));
+  }
+  EXPECT_NEAR(legendre_series(0.3, -1, 1, c, 3),
+              0.5 * 0.3 + 0.25 * std::legendre(2, 0.3) + 0.125 * std::legendre(3, 0.3), 1e-15);
 }
 
 }  // namespace

@@ -47,8 +47,7 @@ TEST_P(ExampleSet, ResidualAndVerdict) {
   EXPECT_THAT(found, testing::UnorderedElementsAreArray(example.effects));
   EXPECT_THAT(result.diagnosis.unlisted, testing::IsEmpty());
   const Evaluation confirmed =
-      evaluate({result.estimates.batch_ls, result.final.batch_ls, result.diagnosis.effects, {}},
-               read_set(folder / "confirm.csv"), description);
+      evaluate(certified_model(result), read_set(folder / "confirm.csv"), description);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     SCOPED_TRACE(kAxisName[axis]);
     const double tolerance = example.clean() ? 0.03 : 0.10;

@@ -116,9 +116,7 @@ TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
   const Calibration result = calibrated(data);
   ASSERT_EQ(result.diagnosis.effects.size(), 1U) << result.diagnosis.reason;
   EXPECT_EQ(result.diagnosis.effects.front().parameters.size(), 4U);
-  const CertifiedModel model{result.estimates.batch_ls, result.final.batch_ls,
-                             result.diagnosis.effects, result.diagnosis.unlisted};
-  const Evaluation evaluation = evaluate(model, data.run, data.description);
+  const Evaluation evaluation = evaluate(certified_model(result), data.run, data.description);
   EXPECT_LT(evaluation.after.pose_rms_mps2[0], 1.3 * result.floor_pose_rms_mps2[0]);
 }
 

@@ -345,8 +345,7 @@ SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration
   check_twelve(set, calibration, outcome);
   score_oracle(set, outcome);
 
-  const CertifiedModel model{calibration.estimates.batch_ls, calibration.final.batch_ls,
-                             calibration.diagnosis.effects, calibration.diagnosis.unlisted};
+  const CertifiedModel model = certified_model(calibration);
   outcome.before.heldout = over_axes(calibration.before.heldout_pose_rms_mps2);
   outcome.after.heldout = over_axes(calibration.after.heldout_pose_rms_mps2);
   score_fresh(set, model, outcome);

@@ -1,0 +1,174 @@
+#include "estimator/effects/memory_term.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <numeric>
+#include <string>
+#include <utility>
+
+namespace plumbline {
+namespace {
+
+constexpr double kLeast_s = 30, kMost_s = 4800;
+constexpr int kTimeConstants = 6;  // that a search starts from
+constexpr int kParts = 8;          // into which the table divides the way between two of them
+
+std::vector<double> time_constants_s() {
+  return effect::geometric(kLeast_s, kMost_s, (kTimeConstants - 1) * kParts + 1);
+}
+
+/// How what is remembered went on between two visits: a column evenly, an attitude only at the
+/// next.
+enum class Between { evenly, as_before };
+
+/// The average of the past at every visit, which began at the first one as it was there.
+std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<double>& value,
+                                        Between between, double tau_s) {
+  std::vector<double> average(value.size());
+  double state = value.empty() ? 0 : value.front();  // at the end of a visit
+  double end_s = 0;
+  for (std::size_t k = 0; k < value.size(); ++k) {
+    const Visit& visit = log.visits[k];
+    const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+    if (k > 0) {
+      const double kept = std::exp(-(visit.t_arrival_s - end_s) / tau_s);
+      const double meanwhile =
+          between == Between::evenly ? std::midpoint(value[k - 1], value[k]) : value[k - 1];
+      state = meanwhile + kept * (state - meanwhile);
+    }
+    average[k] =
+        value[k] + (state - value[k]) * effect::mean_decay(visit, visit.t_arrival_s, tau_s);
+    state = value[k] + (state - value[k]) * std::exp(-dwell_s / tau_s);
+    end_s = visit.t_arrival_s + dwell_s;
+  }
+  return average;
+}
+
+/// One variable and its averages.
+class Memory {
+ public:
+  /// `values`: at every visit, of each axis or of all three alike.
+  Memory(std::string name, bool less_average, Between between,
+         std::vector<std::vector<double>> values, const VisitLog& log)
+      : name_(std::move(name)),
+        less_average_(less_average),
+        between_(between),
+        values_(std::move(values)),
+        log_(log) {}
+
+  const std::string& name() const { return name_; }
+  /// For the time constants that time_constants_s() lists, and by interpolation in between.
+  double at(double tau_s, std::size_t axis, std::size_t visit) const {
+    std::call_once(once_, [this] { make_table(); });
+    const double steps = std::log(tau_s / kLeast_s) / std::log(kMost_s / kLeast_s) *
+                         static_cast<double>(table_.size() - 1);
+    const double position = std::clamp(steps, 0.0, static_cast<double>(table_.size() - 1));
+    const auto below = std::min(static_cast<std::size_t>(position), table_.size() - 2);
+    const std::size_t source = axis % values_.size();
+    const double average = std::lerp(table_[below][source][visit], table_[below + 1][source][visit],
+                                     position - static_cast<double>(below));
+    return less_average_ ? values_[source][visit] - average : average;
+  }
+  /// Over all axes and visits.
+  std::pair<double, double> range(double tau_s) const {
+    std::pair<double, double> range{at(tau_s, 0, 0), at(tau_s, 0, 0)};
+    for (std::size_t axis = 0; axis < values_.size(); ++axis)
+      for (std::size_t k = 0; k < log_.visits.size(); ++k) {
+        const double value = at(tau_s, axis, k);
+        range = {std::min(range.first, value), std::max(range.second, value)};
+      }
+    return range;
+  }
+
+ private:
+  void make_table() const {
+    for (const double tau_s : time_constants_s()) {
+      auto& averages = table_.emplace_back();
+      for (const std::vector<double>& value : values_)
+        averages.push_back(average_of_the_past(log_, value, between_, tau_s));
+    }
+  }
+
+  std::string name_;
+  bool less_average_;
+  Between between_;
+  std::vector<std::vector<double>> values_;
+  const VisitLog& log_;
+  // Made when it is first asked for: a log of many visits may need none.
+  mutable std::once_flag once_;
+  mutable std::vector<std::vector<std::vector<double>>> table_;  // by time constant
+};
+
+class MemoryTerm final : public SmoothTerm {
+ public:
+  MemoryTerm(std::shared_ptr<const Memory> memory, Target target)
+      : memory_(std::move(memory)), target_(target) {}
+
+  std::string id() const override {
+    return "unlisted:" + memory_->name() + ":" + to_string(target_.form);
+  }
+  const std::string& driver() const override { return memory_->name(); }
+  TermForm form() const override { return target_.form; }
+  std::string shape() const override {
+    return "straight line in the average of the past" + target_.words();
+  }
+  Subject subject() const override { return Subject::sensor; }
+  bool remembers() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", "", ParameterRole::index},
+            {"high", "", ParameterRole::index},
+            {"t0", "s", ParameterRole::index},
+            {"tau", "s", ParameterRole::shape},
+            {"start", target_.unit(), ParameterRole::amplitude},
+            {"p1", target_.unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    const double span_s = log.last_s() - log.first_s();
+    const double step_s = span_s / std::max<double>(1, static_cast<double>(log.visits.size()) - 1);
+    const double size = target_.typical_size();
+    std::vector<Hypothesis> starts;
+    for (const double tau_s : effect::geometric(kLeast_s, kMost_s, kTimeConstants)) {
+      if (tau_s < step_s || tau_s > span_s / 2) continue;
+      const auto [low, high] = memory_->range(tau_s);
+      if (!(high > low)) continue;  // what never varied drives nothing
+      for (const double start : {0.0, size})
+        starts.push_back({{low, high, log.first_s(), tau_s, start, size}});
+    }
+    return starts;
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    const double value = memory_->at(p[3], input.axis, input.visit);
+    // What was remembered before the first visit, nobody saw.
+    const double start = p[4] * effect::mean_decay(input.at(), p[2], p[3]);
+    return target_.factor(input) * (start + legendre_series(value, p[0], p[1], p + 5, 1));
+  }
+
+ private:
+  std::shared_ptr<const Memory> memory_;
+  Target target_;
+};
+
+}  // namespace
+
+std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log) {
+  std::vector<std::shared_ptr<const Memory>> memories;
+  const Driver attitude = load(log);
+  memories.push_back(std::make_shared<const Memory>(
+      attitude.name, false, Between::as_before,
+      std::vector<std::vector<double>>(attitude.value.begin(), attitude.value.end()), log));
+  for (const Driver& driver : instantaneous_drivers(log)) {
+    if (!driver.recorded || driver.name.ends_with(".rate")) continue;
+    for (const bool less_average : {false, true})
+      memories.push_back(std::make_shared<const Memory>(
+          driver.name + (less_average ? ".rate" : ""), less_average, Between::evenly,
+          std::vector<std::vector<double>>{driver.value[0]}, log));
+  }
+  std::vector<std::unique_ptr<SmoothTerm>> terms;
+  for (const auto& memory : memories)
+    for (const TermForm form : {TermForm::bias, TermForm::scale})
+      terms.push_back(std::make_unique<MemoryTerm>(memory, Target{form}));
+  return terms;
+}
+
+}  // namespace plumbline

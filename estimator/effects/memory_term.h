@@ -1,0 +1,18 @@
+// Straight lines in what a variable was on average lately: creep, moisture, heat that lags behind.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/smooth_term.h"
+
+namespace plumbline {
+
+/// Proportional to the average of the past with weight exp(−age/τ), τ unknown: of every recorded
+/// column, of a column less its average, which is its rate without the noise of a slope, and of the
+/// specific force of the own axis; added to the bias and to the scale. With and without a beginning
+/// that differs from what the first visit shows.
+std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log);
+
+}  // namespace plumbline
