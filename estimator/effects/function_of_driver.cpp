@@ -76,7 +76,9 @@ class FunctionOfDriver : public SmoothTerm {
   std::pair<double, double> range_;  ///< asked for whenever a parameter is described
 };
 
-/// Legendre polynomials of degree 1 … d over the range that was seen.
+/// Legendre polynomials of degree 1 … d over the range that was seen. Where the 12 parameters do
+/// not hold its mean, there is one of degree 0: what is proportional to a temperature or to the
+/// time is so from a zero outside the range.
 class Polynomial final : public FunctionOfDriver {
  public:
   Polynomial(DriverPointer driver, Target target, int degree)
@@ -85,7 +87,7 @@ class Polynomial final : public FunctionOfDriver {
   std::vector<ParameterInfo> parameters() const override {
     std::vector<ParameterInfo> infos = {{"low", "", ParameterRole::index},
                                         {"high", "", ParameterRole::index}};
-    for (int d = 1; d <= degree_; ++d)
+    for (int d = first_degree(); d <= degree_; ++d)
       infos.push_back({"p" + std::to_string(d), target().unit(), ParameterRole::amplitude});
     return infos;
   }
@@ -104,7 +106,15 @@ class Polynomial final : public FunctionOfDriver {
     return "polynomial of degree " + std::to_string(degree_);
   }
   double at(double value, const double* p) const override {
-    return legendre_series(value, p[0], p[1], p + 2, degree_);
+    const double constant = first_degree() == 0 ? p[2] : 0;
+    return constant + legendre_series(value, p[0], p[1], p + 3 - first_degree(), degree_);
+  }
+  int first_degree() const {
+    const bool clock_or_record = variable().recorded || variable().name == "t_s";
+    const bool mean_in_the_twelve = target().form == TermForm::geometry
+                                        ? target().angle == &HeadGeometry::delta_rad
+                                        : !target().second;
+    return clock_or_record && !mean_in_the_twelve ? 0 : 1;
   }
 
   int degree_;

@@ -75,6 +75,36 @@ TEST(DiagnosisStudy, EffectsWithSharpShapesHaveTheirDriverAndNoListedName) {
   }
 }
 
+// What a product of components is on average has a listed name; together with what varies it is one
+// finding without one.
+TEST(DiagnosisStudy, WhatVariesIsOneFindingWithItsMean) {
+  const SetOutcome outcome = run_set({.seed = 530003,
+                                      .effects = {"own.chimney"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::raster,
+                                      .static_s = 1800});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.listed_instead, 0) << outcome.found;
+  EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
+}
+
+// The humidity goes on falling after the run, and the average of its past is where the run left it.
+TEST(DiagnosisStudy, FreshPosesGoOnWhereTheRunEnded) {
+  const SetOutcome outcome = run_set({.seed = 410001,
+                                      .effects = {"own.swelling"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::white,
+                                      .bits = 12,
+                                      .samples_per_pose = 50,
+                                      .static_s = 300});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.2 * outcome.oracle.fresh);
+  EXPECT_LT(outcome.evaluated_fresh, 1.2 * outcome.oracle.fresh);
+}
+
 SetDesign coarse_in_slow_noise(std::uint64_t seed, const char* effect, sim::RecordOrder order) {
   return {.seed = seed,
           .effects = {effect},
