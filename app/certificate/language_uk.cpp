@@ -423,6 +423,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"bend", "злам"},
     {"straight line", "пряма"},
     {"step", "сходинка"},
+    {"exponential", "експонента"},
     {"lag behind a play", "відставання через люфт"},
     {"polynomial of degree {}", "многочлен степеня {}"},
     {"harmonic series of order {}", "гармонічний ряд порядку {}"},

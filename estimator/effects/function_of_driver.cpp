@@ -373,6 +373,26 @@ class Step final : public FunctionOfDriver {
   }
 };
 
+class Decay final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"tau", "s", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const double span_s = range().second - range().first;
+    std::vector<Hypothesis> starts;
+    for (const double tau_s : effect::geometric(span_s / 30, span_s / 2, 5))
+      starts.push_back({{tau_s, target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "exponential"; }
+  double at(double t_s, const double* p) const override { return p[1] * std::exp(-t_s / p[0]); }
+};
+
 class PlayLag final : public FunctionOfDriver {
  public:
   using FunctionOfDriver::FunctionOfDriver;
@@ -469,6 +489,9 @@ std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
 }
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target) {
   return std::make_unique<Step>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target) {
+  return std::make_unique<Decay>(std::move(clock), target);
 }
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
   return std::make_unique<PlayLag>(std::move(driver), target);

@@ -53,6 +53,8 @@ std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
 /// From nothing to all of it about an unknown value, sharply or gradually (logistic function).
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target);
+/// What dies away with the time, by an unknown time constant.
+std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target);
 /// What follows the driver through a play of unknown width lags behind it by this function.
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
 

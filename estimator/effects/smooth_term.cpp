@@ -95,6 +95,11 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
       add(pulses(driver, bias));
       for (const Target& target : {bias, scale, of_delta, of_h, of_roll})
         add(wave(driver, target, {1.5, 0.5, 40}));
+      // For the bias both are listed effects, and a step of delta is a slipped index.
+      for (const Target& target : {scale, of_h, of_roll}) {
+        add(step(driver, target));
+        add(decay(driver, target));
+      }
     }
     if (driver->angle) {
       for (const Target& target : {bias, of_delta, of_h}) add(bell(driver, target));

@@ -19,6 +19,7 @@ namespace {
 using testing::Contains;
 using testing::Field;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 const Adc kSixteenBits{16, -5.0, 0.0};
 
@@ -105,6 +106,39 @@ TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
   EXPECT_NEAR(step.parameters[1].value, 121.075, 4 * step.parameters[1].u);
   EXPECT_GT(step.parameters[1].u, 0);
   EXPECT_LT(step.parameters[1].u, 0.01);
+}
+
+void expect_only_structure(const SyntheticOptions& options, const char* form, const char* shape) {
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, "t_s");
+  EXPECT_EQ(found.form, form);
+  EXPECT_EQ(found.shape, shape);
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    EXPECT_LT(result.after.heldout_pose_rms_mps2[i], 1.3 * result.floor_pose_rms_mps2[i]);
+}
+
+// What no listed effect describes: the nearest one would be a straight drift or a crooked spindle.
+TEST(Findings, AnAxisThatWasStruckHasAnotherScaleFromThenOn) {
+  SyntheticOptions options;
+  options.more_x_V = [](double a_x_g, double t_s) { return t_s < 150 ? 0 : 1e-3 * a_x_g; };
+  expect_only_structure(options, "scale", "step");
+}
+
+TEST(Findings, AScaleThatWarmsUpDiesAway) {
+  SyntheticOptions options;
+  options.more_x_V = [](double a_x_g, double t_s) { return 6e-2 * std::exp(-t_s / 25) * a_x_g; };
+  expect_only_structure(options, "scale", "exponential");
+}
+
+TEST(Findings, ABaseThatWasPushedStandsCrookedFromThenOn) {
+  SyntheticOptions options;
+  options.base_roll_rad = [](double t_s) { return t_s < 150 ? 0 : 0.02; };
+  expect_only_structure(options, "geometry", "step, added to the base roll");
 }
 
 TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {

@@ -17,6 +17,7 @@ struct SyntheticOptions {
   double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
   /// Anything else that x does, V, of its specific force in g and the time in s.
   std::function<double(double, double)> more_x_V = {};
+  std::function<double(double)> base_roll_rad = {};  ///< at a time in s
 };
 
 struct SyntheticRun {
@@ -44,9 +45,12 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
 
   const auto add_sample = [&](SampleTable& table, double t_s, double delta_deg, double h_deg) {
     const double c = std::cos(h_deg * kRadians);
-    const std::array<double, 3> a = {gamma * c * std::cos(delta_deg * kRadians),
-                                     -gamma * c * std::sin(delta_deg * kRadians),
-                                     gamma * std::sin(h_deg * kRadians)};
+    const double roll_rad = options.base_roll_rad ? options.base_roll_rad(t_s) : 0;
+    const double cd = std::cos(delta_deg * kRadians), sd = std::sin(delta_deg * kRadians);
+    const double up[] = {c * std::cos(roll_rad), -std::sin(roll_rad),
+                         std::sin(h_deg * kRadians) * std::cos(roll_rad)};
+    const std::array<double, 3> a = {gamma * (up[0] * cd + up[1] * sd),
+                                     gamma * (up[1] * cd - up[0] * sd), gamma * up[2]};
     table.t_s.push_back(t_s);
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       const auto& row = result.truth[axis];
