@@ -10,6 +10,7 @@
 namespace plumbline {
 namespace {
 
+// What is forgotten sooner is settling after a move; what lasts longer than a run is a drift.
 constexpr double kLeast_s = 30, kMost_s = 4800;
 constexpr int kTimeConstants = 6;  // that a search starts from
 constexpr int kParts = 8;          // into which the table divides the way between two of them
