@@ -31,6 +31,18 @@ Eigen::ArrayXd since_arrival_s(const Visit& visit) {
   return visit.step_s * Eigen::ArrayXd::LinSpaced(last + 1, 0, static_cast<double>(last));
 }
 
+Eigen::ArrayXd decay_since_arrival(const Visit& visit, double tau_s) {
+  // Many time constants are tried on many samples: a product each instead of an exponential.
+  const double ratio = std::exp(-visit.step_s / tau_s);
+  Eigen::ArrayXd decay(static_cast<Eigen::Index>(visit.count));
+  double now = 1;
+  for (double& value : decay) {
+    value = now;
+    now *= ratio;
+  }
+  return decay;
+}
+
 double mean_decay(const Visit& visit, double origin_s, double tau_s) {
   const double first = std::exp(-(visit.t_arrival_s - origin_s) / tau_s);
   const double ratio = std::exp(-visit.step_s / tau_s);

@@ -124,6 +124,8 @@ inline constexpr double kSmallAngle_deg = 0.02;
 
 /// Times of the samples of the visit from the first on.
 Eigen::ArrayXd since_arrival_s(const Visit& visit);
+/// exp(−(t − t_arrival)/τ) at those times.
+Eigen::ArrayXd decay_since_arrival(const Visit& visit, double tau_s);
 /// Mean over the dwell of exp(−(t − origin)/τ), in closed form for even spacing.
 double mean_decay(const Visit& visit, double origin_s, double tau_s);
 /// `count` values from `first` to `last` in equal ratios.

@@ -53,7 +53,7 @@ class HeadDecay final : public SmoothTerm {
     head.*angle_ += size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0));
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    const Eigen::ArrayXd decay = (-effect::since_arrival_s(log.visits[visit]) / p[1]).exp();
+    const Eigen::ArrayXd decay = effect::decay_since_arrival(log.visits[visit], p[1]);
     return {angle_, size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
   }
 

@@ -29,7 +29,7 @@ class Settling final : public Effect {
   bool remembers() const override { return true; }
   bool within_dwell() const override { return true; }
   Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
-    return p[0] * came_from_g(input) * (-effect::since_arrival_s(input.at()) / p[1]).exp().matrix();
+    return p[0] * came_from_g(input) * effect::decay_since_arrival(input.at(), p[1]).matrix();
   }
 
  private:

@@ -122,7 +122,7 @@ std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
   constexpr double kStill_rad = 1e-9;  // degrees that became radians and came back
   std::array<int, 2> direction = before.delta_direction;
   const double commanded = delta_rad - before.delta_rad;
-  const double turn[] = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
+  const std::array<double, 2> turn = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
   for (std::size_t way = 0; way < direction.size(); ++way)
     if (std::abs(turn[way]) > kStill_rad) direction[way] = turn[way] > 0 ? 1 : -1;
   return direction;
