@@ -8,6 +8,7 @@
 #include <random>
 #include <tuple>
 
+#include "estimator/effects/smooth_term.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -48,6 +49,19 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
     longer.visits.push_back(std::move(visit));
   }
   return longer;
+}
+
+/// The model with `terms` in place of its own smooth terms, which know the visits of their log
+/// only.
+EnlargedParameters with_terms(const std::vector<std::unique_ptr<SmoothTerm>>& terms,
+                              EnlargedParameters model) {
+  for (ActiveEffect& active : model.effects) {
+    const auto* own = dynamic_cast<const SmoothTerm*>(active.effect);
+    if (own == nullptr) continue;
+    for (const auto& term : terms)
+      if (term->is(own->driver(), to_string(own->form()), own->shape())) active.effect = term.get();
+  }
+  return model;
 }
 
 /// Rows of the visits from `first` on, in units of their noise: the means, then, where something
@@ -159,12 +173,13 @@ class Design {
   std::vector<Rows> rows(const std::vector<Stop>& stops, double samples_factor) const {
     const VisitLog log = extended(log_, stops, samples_factor);
     const NewRows rows = new_rows(samples_factor);
-    const Eigen::VectorXd expected = rows.of(log, result_.fit.parameters);
+    const auto terms = smooth_terms(log, SmoothTermSelection::any);
+    const Eigen::VectorXd expected = rows.of(log, with_terms(terms, result_.fit.parameters));
     std::vector<Rows> all(contests_.size());
     parallel_for(contests_.size(), [&](std::size_t r) {
       const Contest& contest = contests_[r];
-      all[r] = {expected - rows.of(log, *contest.rival),
-                numeric_rows(log, rows, *contest.rival, contest.scale)};
+      const EnlargedParameters rival = with_terms(terms, *contest.rival);
+      all[r] = {expected - rows.of(log, rival), numeric_rows(log, rows, rival, contest.scale)};
     });
     return all;
   }

@@ -1,6 +1,7 @@
 // The variables that may drive a residual, at every visit of a log.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -16,7 +17,7 @@ struct Driver {
   std::string past;                    ///< how its past enters, in words; empty: not at all
   PerAxis<std::vector<double>> value;  ///< per axis and visit
   bool angle = false;                  ///< periodic in 2π
-  bool recorded = false;               ///< a column of the measurement file
+  bool recorded = false;               ///< a column of the measurement file, or its rate
   bool in_the_twelve = false;          ///< a bias proportional to it is what K and U₀ describe
   /// Where the values can lie; without it, where they do.
   std::optional<std::pair<double, double>> span = {};
@@ -24,7 +25,10 @@ struct Driver {
   /// explain themselves prove nothing.
   std::optional<std::size_t> output_of = {};
   bool varies() const;
+  bool is_clock() const { return name == "t_s"; }
+  bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column
 };
+using DriverPointer = std::shared_ptr<const Driver>;
 
 /// Time, angles, the specific force, what came before, and every recorded column with its rate of
 /// change.

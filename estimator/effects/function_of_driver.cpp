@@ -29,9 +29,7 @@ class FunctionOfDriver : public SmoothTerm {
   Subject subject() const override {
     return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
   }
-  bool remembers() const override {
-    return !driver_->past.empty() || driver_->name.ends_with(".rate");
-  }
+  bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
   void displace(const VisitLog&, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     head.*target_.angle += of_visit(0, visit, p) * effect::kRadPerDeg;
@@ -110,7 +108,7 @@ class Polynomial final : public FunctionOfDriver {
     return constant + legendre_series(value, p[0], p[1], p + 3 - first_degree(), degree_);
   }
   int first_degree() const {
-    const bool clock_or_record = variable().recorded || variable().name == "t_s";
+    const bool clock_or_record = variable().recorded || variable().is_clock();
     const bool mean_in_the_twelve = target().form == TermForm::geometry
                                         ? target().angle == &HeadGeometry::delta_rad
                                         : !target().second;

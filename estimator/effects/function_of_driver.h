@@ -11,8 +11,6 @@
 
 namespace plumbline {
 
-using DriverPointer = std::shared_ptr<const Driver>;
-
 /// What a function of the visits acts on.
 struct Target {
   TermForm form = TermForm::bias;

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "estimator/effects/function_of_driver.h"
+
 namespace plumbline {
 namespace {
 
@@ -19,13 +21,10 @@ std::vector<double> time_constants_s() {
   return effect::geometric(kLeast_s, kMost_s, (kTimeConstants - 1) * kParts + 1);
 }
 
-/// How what is remembered went on between two visits: a column evenly, an attitude only at the
-/// next.
-enum class Between { evenly, as_before };
-
-/// The average of the past at every visit, which began at the first one as it was there.
+/// The average of the past at every visit, which began at the first one as it was there. Between
+/// two visits a value `changes_evenly`, or stays until the next.
 std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<double>& value,
-                                        Between between, double tau_s) {
+                                        bool changes_evenly, double tau_s) {
   std::vector<double> average(value.size());
   double state = value.empty() ? 0 : value.front();  // at the end of a visit
   double end_s = 0;
@@ -35,7 +34,7 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
     if (k > 0) {
       const double kept = std::exp(-(visit.t_arrival_s - end_s) / tau_s);
       const double meanwhile =
-          between == Between::evenly ? std::midpoint(value[k - 1], value[k]) : value[k - 1];
+          changes_evenly ? std::midpoint(value[k - 1], value[k]) : value[k - 1];
       state = meanwhile + kept * (state - meanwhile);
     }
     average[k] =
@@ -46,16 +45,13 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
   return average;
 }
 
-/// One variable and its averages.
+/// One variable and its averages, or what it is above them.
 class Memory {
  public:
-  /// `values`: at every visit, of each axis or of all three alike.
-  Memory(std::string name, bool less_average, Between between,
-         std::vector<std::vector<double>> values, const VisitLog& log)
-      : name_(std::move(name)),
+  Memory(DriverPointer driver, bool less_average, const VisitLog& log)
+      : driver_(std::move(driver)),
+        name_(driver_->name + (less_average ? ".rate" : "")),
         less_average_(less_average),
-        between_(between),
-        values_(std::move(values)),
         log_(log) {}
 
   const std::string& name() const { return name_; }
@@ -66,15 +62,15 @@ class Memory {
                          static_cast<double>(table_.size() - 1);
     const double position = std::clamp(steps, 0.0, static_cast<double>(table_.size() - 1));
     const auto below = std::min(static_cast<std::size_t>(position), table_.size() - 2);
-    const std::size_t source = axis % values_.size();
+    const std::size_t source = axis % sources();
     const double average = std::lerp(table_[below][source][visit], table_[below + 1][source][visit],
                                      position - static_cast<double>(below));
-    return less_average_ ? values_[source][visit] - average : average;
+    return less_average_ ? driver_->value[source][visit] - average : average;
   }
   /// Over all axes and visits.
   std::pair<double, double> range(double tau_s) const {
     std::pair<double, double> range{at(tau_s, 0, 0), at(tau_s, 0, 0)};
-    for (std::size_t axis = 0; axis < values_.size(); ++axis)
+    for (std::size_t axis = 0; axis < sources(); ++axis)
       for (std::size_t k = 0; k < log_.visits.size(); ++k) {
         const double value = at(tau_s, axis, k);
         range = {std::min(range.first, value), std::max(range.second, value)};
@@ -83,18 +79,20 @@ class Memory {
   }
 
  private:
+  /// A column is the same for all axes, an attitude is each axis's own.
+  std::size_t sources() const { return driver_->recorded ? 1 : kAxisCount; }
   void make_table() const {
     for (const double tau_s : time_constants_s()) {
       auto& averages = table_.emplace_back();
-      for (const std::vector<double>& value : values_)
-        averages.push_back(average_of_the_past(log_, value, between_, tau_s));
+      for (std::size_t source = 0; source < sources(); ++source)
+        averages.push_back(
+            average_of_the_past(log_, driver_->value[source], driver_->recorded, tau_s));
     }
   }
 
+  DriverPointer driver_;
   std::string name_;
   bool less_average_;
-  Between between_;
-  std::vector<std::vector<double>> values_;
   const VisitLog& log_;
   // Made when it is first asked for: a log of many visits may need none.
   mutable std::once_flag once_;
@@ -152,19 +150,14 @@ class MemoryTerm final : public SmoothTerm {
 
 }  // namespace
 
-std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log) {
-  std::vector<std::shared_ptr<const Memory>> memories;
-  const Driver attitude = load(log);
-  memories.push_back(std::make_shared<const Memory>(
-      attitude.name, false, Between::as_before,
-      std::vector<std::vector<double>>(attitude.value.begin(), attitude.value.end()), log));
-  for (const Driver& driver : instantaneous_drivers(log)) {
-    if (!driver.recorded || driver.name.ends_with(".rate")) continue;
+std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log,
+                                                      const DriverPointer& attitude,
+                                                      const std::vector<DriverPointer>& columns) {
+  std::vector<std::shared_ptr<const Memory>> memories = {
+      std::make_shared<const Memory>(attitude, false, log)};
+  for (const DriverPointer& column : columns)
     for (const bool less_average : {false, true})
-      memories.push_back(std::make_shared<const Memory>(
-          driver.name + (less_average ? ".rate" : ""), less_average, Between::evenly,
-          std::vector<std::vector<double>>{driver.value[0]}, log));
-  }
+      memories.push_back(std::make_shared<const Memory>(column, less_average, log));
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   for (const auto& memory : memories)
     for (const TermForm form : {TermForm::bias, TermForm::scale})

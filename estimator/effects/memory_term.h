@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/driver.h"
 #include "estimator/effects/smooth_term.h"
 
 namespace plumbline {
@@ -13,6 +13,8 @@ namespace plumbline {
 /// column, of a column less its average, which is its rate without the noise of a slope, and of the
 /// specific force of the own axis; added to the bias and to the scale. With and without a beginning
 /// that differs from what the first visit shows.
-std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log);
+std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log,
+                                                      const DriverPointer& attitude,
+                                                      const std::vector<DriverPointer>& columns);
 
 }  // namespace plumbline

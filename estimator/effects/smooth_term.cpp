@@ -25,6 +25,11 @@ const char* to_string(TermForm form) {
   return "geometry";
 }
 
+bool SmoothTerm::is(const std::string& a_driver, const std::string& a_form,
+                    const std::string& a_shape) const {
+  return driver() == a_driver && to_string(form()) == a_form && shape() == a_shape;
+}
+
 namespace {
 
 /// The mean of the readings stands for the converter's code.
@@ -66,12 +71,13 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   const Target of_delta{TermForm::geometry}, of_h{TermForm::geometry, &HeadGeometry::h_rad};
   const Target of_roll{TermForm::geometry, &HeadGeometry::roll_rad};
   const Target of_skew{TermForm::geometry, &HeadGeometry::skew_rad};
+  std::vector<DriverPointer> columns;
   for (Driver& each : instantaneous_drivers(log)) {
     const auto driver = std::make_shared<const Driver>(std::move(each));
     if (!any && !driver->varies()) continue;  // a variable that never varied drives nothing
     for (const Target& target : {bias, scale, of_delta, of_h})
       add_polynomials(driver, target, {1, 2, 3, 5});
-    const bool clock = driver->name == "t_s", rate = driver->name.ends_with(".rate");
+    const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
     if (driver->recorded || clock) {
       for (std::size_t other = 1; other < kAxisCount; ++other)
         add_polynomials(driver, {.form = TermForm::scale, .other = other}, {1, 2});
@@ -80,11 +86,12 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
           add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add_polynomials(driver, of_roll, {1, 2, 3});
     }
-    if (clock || (driver->recorded && !rate)) {
+    if (clock || column) {
       add(bend(driver, bias));
       add(bend(driver, scale));
     }
-    if (driver->recorded && !rate) {
+    if (column) {
+      columns.push_back(driver);
       add(step(driver, bias));
       add(step(driver, scale));
       add(play(driver, bias));
@@ -114,7 +121,7 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   for (const Target& target : {of_delta, of_h, of_skew}) add(wave(turn, target, {0.2, 0.2, 6}));
   const auto attitude = std::make_shared<const Driver>(load(log));
   if (any || attitude->varies()) add(play(attitude, bias));
-  for (auto& term : memory_terms(log)) add(std::move(term));
+  for (auto& term : memory_terms(log, attitude, columns)) add(std::move(term));
   // What repeats from step to step, or every second step, is the rounding itself, or a bit.
   constexpr double kShortestWave = 2.5;  // steps
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
