@@ -171,7 +171,13 @@ std::string evaluation_summary(const Evaluation& evaluation, const std::optional
         fmt::format("; {}: limit {} m/s²", largest <= limits->max_abs_error_mps2 ? "PASS" : "FAIL",
                     significant(limits->max_abs_error_mps2, 3));
   }
-  return text + ".\n";
+  text += ".\n";
+  if (!evaluation.left_out.empty()) {
+    text += fmt::format(
+        "Not applied, as it belonged to the calibration run or this set lacks a column: {}.\n",
+        fmt::join(evaluation.left_out, ", "));
+  }
+  return text;
 }
 
 }  // namespace plumbline::app

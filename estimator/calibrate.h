@@ -234,6 +234,8 @@ struct Evaluation {
   std::size_t samples = 0;
   EvaluationFigures before;  ///< the 12 parameters alone
   EvaluationFigures after;   ///< the certified model
+  /// What of it is not applied: it belonged to the run, or needs a column that the set lacks.
+  std::vector<std::string> left_out;
 };
 
 /// What of a calibration is needed to apply it to other data.

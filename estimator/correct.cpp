@@ -12,13 +12,6 @@
 namespace plumbline {
 namespace {
 
-/// What came before a reading is not in the file: between two readings the triad may have been
-/// anywhere.
-bool needs_history(const std::string& id) {
-  return id == "sensor.hysteresis" || id == "sensor.settling" ||
-         id.find("previous_pose") != std::string::npos;
-}
-
 /// Of an effect that a user described: what a reading alone does not tell.
 bool needs_a_head(const std::string& definition) {
   for (const char* word : {"prev_", "pose", "delta_deg", "h_deg"})
@@ -26,11 +19,13 @@ bool needs_a_head(const std::string& definition) {
   return false;
 }
 
-bool can_be_computed(const ActiveEffect& active) {
-  const std::string id = active.effect->id();
-  if (needs_a_head(active.effect->definition())) return false;
-  return active.effect->subject() == Subject::sensor && !needs_history(id) &&
-         id != "env.base_field" && id != "adc.quantization" && id != "adc.mains_pickup";
+bool can_be_computed(const Effect& effect) {
+  const std::string id = effect.id();
+  // What came before a reading is not in the file: between two of them the triad may have been
+  // anywhere.
+  if (effect.remembers() || needs_a_head(effect.definition())) return false;
+  return effect.subject() == Subject::sensor && id != "env.base_field" &&
+         id != "adc.quantization" && id != "adc.mains_pickup";
 }
 
 /// Every reading as a visit of its own, at the angles under which a head would show its specific
@@ -72,32 +67,14 @@ Corrected correct_readings(const CertifiedModel& model, const SampleTable& readi
 
   Corrected result;
   const VisitLog log = make_visit_log(as_visits(readings, a_g), description);
-  std::vector<std::shared_ptr<const Effect>> owned;
-  const EnlargedParameters enlarged = restore_model(model, log, owned);
+  const RestoredModel restored = restore_model(model, log);
   std::vector<ActiveEffect> effects;
-  for (const ActiveEffect& active : enlarged.effects) {
-    const bool good = can_be_computed(active);
+  for (const ActiveEffect& active : restored.parameters.effects) {
+    const bool good = can_be_computed(*active.effect);
     add_name(good ? result.applied : result.left_out, active.effect->id());
     if (good) effects.push_back(active);
   }
-  // What restore_model() could not bring back belonged to one run or needs a column.
-  const auto missing = [&](const std::string& id) {
-    return std::none_of(enlarged.effects.begin(), enlarged.effects.end(),
-                        [&](const ActiveEffect& active) { return active.effect->id() == id; });
-  };
-  for (const FoundEffect& found : model.effects) {
-    if (missing(found.id)) add_name(result.left_out, found.id);
-  }
-  if (enlarged.effects.size() < model.effects.size() + model.unlisted.size()) {
-    for (const UnlistedStructure& found : model.unlisted) {
-      const bool there = std::any_of(
-          enlarged.effects.begin(), enlarged.effects.end(), [&](const ActiveEffect& active) {
-            return active.effect->id().find(found.driver) != std::string::npos;
-          });
-      if (!there) add_name(result.left_out, "unlisted: " + found.driver);
-    }
-  }
-
+  for (const std::string& name : restored.left_out) add_name(result.left_out, name);
   const std::vector<Eigen::Vector3d> bare_g = a_g;
   for (int pass = 0; pass < kRepetitions && !effects.empty(); ++pass) {
     std::vector<Eigen::Vector3d> next_g = bare_g;

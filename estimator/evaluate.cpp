@@ -53,9 +53,9 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
 
   VisitLog log = make_visit_log(set, description);
   put_in_front(model.history, head, log);
-  std::vector<std::shared_ptr<const Effect>> owned;
-  const EnlargedParameters enlarged = restore_model(model, log, owned);
-  PerAxis<Eigen::VectorXd> enlarged_V = predict_means_V(log, enlarged);
+  RestoredModel restored = restore_model(model, log);
+  result.left_out = std::move(restored.left_out);
+  PerAxis<Eigen::VectorXd> enlarged_V = predict_means_V(log, restored.parameters);
   for (Eigen::VectorXd& axis : enlarged_V) axis = axis.tail(std::ssize(poses)).eval();
   result.after = figures(model.final, enlarged_V, set, poses);
   return result;

@@ -40,6 +40,7 @@ Json evaluation_json(const Evaluation& evaluation, std::size_t skipped_rows,
             {"samples", evaluation.samples},
             {"skipped_rows", skipped_rows}}},
           {"error", {{"before", to_json(evaluation.before)}, {"after", to_json(evaluation.after)}}},
+          {"left_out", evaluation.left_out},
           {"decision", decision}};
 }
 

@@ -316,36 +316,37 @@ void restore(const Effect& effect, const std::vector<std::size_t>& axes,
 
 }  // namespace
 
-EnlargedParameters restore_model(const CertifiedModel& model, const VisitLog& log,
-                                 std::vector<std::shared_ptr<const Effect>>& owned) {
-  EnlargedParameters restored;
-  for (std::size_t i = 0; i < kAxisCount; ++i) restored.twelve[i] = model.final[i].value;
-  for (auto& effect : covariate_effects(log)) owned.push_back(std::move(effect));
-  std::vector<std::shared_ptr<const SmoothTerm>> terms;
-  for (auto& term : smooth_terms(log, SmoothTermSelection::any)) {
-    terms.push_back(std::move(term));
-    owned.push_back(terms.back());
-  }
+RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
+  RestoredModel restored;
+  EnlargedParameters& parameters = restored.parameters;
+  for (std::size_t i = 0; i < kAxisCount; ++i) parameters.twelve[i] = model.final[i].value;
   std::vector<const Effect*> named = effect_catalogue();
   for (const auto& effect : model.own_effects) named.push_back(effect.get());
+  for (auto& effect : covariate_effects(log)) restored.owned.push_back(std::move(effect));
   for (const FoundEffect& found : model.effects) {
+    const std::size_t before = parameters.effects.size();
     for (const Effect* effect : named)
-      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, restored);
-    for (const auto& effect : owned) {
+      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, parameters);
+    for (const auto& effect : restored.owned) {
       // Bias and scale form of a column share the id; the unit of c tells them apart.
       if (effect->id() == found.id && !found.parameters.empty() &&
           effect->parameters().front().unit == found.parameters.front().unit) {
-        restore(*effect, found.axes, found.parameters, restored);
+        restore(*effect, found.axes, found.parameters, parameters);
       }
     }
+    if (parameters.effects.size() == before) restored.left_out.push_back(found.id);
   }
+  std::vector<std::shared_ptr<const SmoothTerm>> terms;
+  if (!model.unlisted.empty())
+    for (auto& term : smooth_terms(log, SmoothTermSelection::any)) terms.push_back(std::move(term));
+  restored.owned.insert(restored.owned.end(), terms.begin(), terms.end());
   for (const UnlistedStructure& found : model.unlisted) {
-    for (const auto& term : terms) {
-      if (term->driver() == found.driver && to_string(term->form()) == found.form &&
-          term->shape() == found.shape) {
-        restore(*term, found.axes, found.parameters, restored);
-      }
-    }
+    const std::size_t before = parameters.effects.size();
+    for (const auto& term : terms)
+      if (term->is(found.driver, found.form, found.shape))
+        restore(*term, found.axes, found.parameters, parameters);
+    if (parameters.effects.size() == before)
+      restored.left_out.push_back("unlisted: " + found.driver);
   }
   return restored;
 }

@@ -154,6 +154,23 @@ TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
   EXPECT_LT(evaluation.after.pose_rms_mps2[0], 1.3 * result.floor_pose_rms_mps2[0]);
 }
 
+TEST(Evaluate, SaysWhatItCannotApply) {
+  const SyntheticRun data = synthetic_run(8, kSixteenBits);
+  CertifiedModel model = certified_model(calibrated(data));
+  const Evaluation whole = evaluate(model, data.run, data.description);
+  EXPECT_THAT(whole.left_out, IsEmpty());
+  FoundEffect& humidity = model.effects.emplace_back();
+  humidity.id = "covariate:rh_pct";
+  humidity.axes = {0};
+  UnlistedStructure& zigzag = model.unlisted.emplace_back();
+  zigzag.driver = "temp_C";
+  zigzag.form = "bias";
+  zigzag.shape = "zigzag";
+  const Evaluation part = evaluate(model, data.run, data.description);
+  EXPECT_THAT(part.left_out, testing::ElementsAre("covariate:rh_pct", "unlisted: temp_C"));
+  EXPECT_EQ(part.after.pose_rms_mps2, whole.after.pose_rms_mps2);
+}
+
 TEST(DetectionLimits, StandForEverythingThatWasNotFound) {
   const SyntheticRun data = synthetic_run(2, kSixteenBits);
   const Calibration result = calibrated(data);
@@ -222,14 +239,19 @@ TEST(Findings, TheFilterHasTheEffectInItsState) {
   for (const double en : result.final.agreement_en) EXPECT_LT(en, 0.3);
 }
 
-TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
-  // On z a square and a slope that changes with the sign differ only below the horizontal.
-  SyntheticRun data = synthetic_run(5, kSixteenBits);
+/// On z a square and a slope that changes with the sign differ only below the horizontal.
+SyntheticRun square_on_z(const SyntheticOptions& options = {}) {
+  SyntheticRun data = synthetic_run(5, kSixteenBits, options);
   for (const Pose& pose : data.run.poses) {
     const double a_z = std::sin(pose.h_deg * std::numbers::pi / 180);
     for (std::size_t i = pose.first; i < pose.first + pose.count; ++i)
       data.run.samples.u_V[2][i] += 0.03 * -0.0328 * a_z * a_z;
   }
+  return data;
+}
+
+TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
+  const SyntheticRun data = square_on_z();
   const Calibration result = calibrated(data);
   ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
   const FoundEffect& found = result.diagnosis.effects.front();
@@ -245,6 +267,21 @@ TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
     EXPECT_GE(stop.h_deg, -40);
     EXPECT_LE(stop.h_deg, 80);
   }
+}
+
+TEST(Findings, PosesTellRivalsApartBesideStructureWithoutAName) {
+  SyntheticOptions options;
+  options.more_x_V = [](double, double t_s) {
+    return 1e-3 * std::exp(-0.5 * std::pow((t_s - 150) / 9, 2));
+  };
+  const Calibration alone = calibrated(square_on_z());
+  const Calibration beside = calibrated(square_on_z(options));
+  ASSERT_EQ(beside.diagnosis.unlisted.size(), 1u) << beside.diagnosis.reason;
+  ASSERT_EQ(beside.diagnosis.effects.size(), 1u) << beside.diagnosis.reason;
+  const SeparatingPlan& plan = beside.diagnosis.effects.front().separating_plan;
+  const SeparatingPlan& other = alone.diagnosis.effects.front().separating_plan;
+  EXPECT_EQ(plan.stops.size(), other.stops.size());
+  EXPECT_NEAR(plan.decides_sigma, other.decides_sigma, 0.3 * other.decides_sigma);
 }
 
 }  // namespace

@@ -246,8 +246,8 @@ void score_fresh(const StudySet& set, const CertifiedModel& model, SetOutcome& o
   const auto poses = pose_means(all);
   const Eigen::MatrixXd A = design_matrix(poses, set.set.description.gravity);
   const VisitLog log = make_visit_log(all, set.set.description);
-  std::vector<std::shared_ptr<const Effect>> owned;
-  const auto predicted_V = predict_means_V(log, restore_model(model, log, owned));
+  const RestoredModel restored = restore_model(model, log);
+  const auto predicted_V = predict_means_V(log, restored.parameters);
   PerAxis<double> before_mps2{};
   PerAxis<double> after_mps2{};
   for (std::size_t i = 0; i < kAxisCount; ++i) {

@@ -68,12 +68,13 @@ std::vector<double> residuals(const RestRecord& record, const MeasurementSet& se
     data.reading.emplace_back(mean.mean_V[0], mean.mean_V[1], mean.mean_V[2]);
   set_attitudes(data, nine);
   ScalarParameters parameters{nine, {}};
-  std::vector<std::shared_ptr<const Effect>> owned;
+  RestoredModel restored;  // holds what the effects are made of
   if (effects != nullptr) {
     CertifiedModel model;
     model.effects = effects->effects;
     model.unlisted = effects->unlisted;
-    parameters.effects = restore_model(model, data.log, owned).effects;
+    restored = restore_model(model, data.log);
+    parameters.effects = restored.parameters.effects;
   }
   const Eigen::VectorXd residual = scalar_residual_mps2(data, parameters);
   return {residual.begin(), residual.end()};
