@@ -9,6 +9,9 @@ namespace plumbline {
 
 namespace {
 
+/// Spans over which flicker noise averages to the level that is meant by U₀.
+constexpr double kFlickerReach = 5;
+
 double duration_s(const SampleWindow& w) { return static_cast<double>(w.count) * w.step_s; }
 double begin_s(const SampleWindow& w) { return w.first_s - w.step_s; }
 double middle_s(const SampleWindow& w) { return begin_s(w) + 0.5 * duration_s(w); }
@@ -88,7 +91,7 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
   if (n == 0) return unit;
   const double origin = begin_s(windows.front());
   const double span = begin_s(windows.back()) + duration_s(windows.back()) - origin;
-  const double log_span = std::log(span);
+  const double log_reach = std::log(kFlickerReach * span);
   Eigen::VectorXd time(n);
   for (Eigen::Index i = 0; i < n; ++i)
     time(i) = middle_s(windows[static_cast<std::size_t>(i)]) - origin - 0.5 * span;
@@ -100,7 +103,7 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
     // The increments of quantization cancel within a window but for the two ends.
     unit[kTermQ](i, i) = 2 / (width * width);
     unit[kTermN](i, i) = 1 / width;
-    unit[kTermB](i, i) = (log_span - mean_log_distance(a, a)) * std::numbers::inv_pi;
+    unit[kTermB](i, i) = (log_reach - mean_log_distance(a, a)) * std::numbers::inv_pi;
     // A random walk of `count` steps, averaged, after the time up to the window.
     const double count = static_cast<double>(a.count);
     const double before = begin_s(a) - origin;
@@ -108,7 +111,7 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
     const double mean_walk = before + 0.5 * a.step_s * (count + 1);
     for (Eigen::Index j = i + 1; j < n; ++j) {
       const SampleWindow& b = windows[static_cast<std::size_t>(j)];
-      unit[kTermB](i, j) = (log_span - mean_log_distance(a, b)) * std::numbers::inv_pi;
+      unit[kTermB](i, j) = (log_reach - mean_log_distance(a, b)) * std::numbers::inv_pi;
       unit[kTermK](i, j) = mean_walk;
       unit[kTermB](j, i) = unit[kTermB](i, j);
       unit[kTermK](j, i) = unit[kTermK](i, j);

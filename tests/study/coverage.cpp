@@ -45,29 +45,23 @@ sim::World world_with(const Converter& converter) {
   return world;
 }
 
-/// Mean over the poses of the slow noise alone. White and slow noise are drawn apart, so that the
-/// same seed gives the same slow noise without the white one.
-PerAxis<double> slow_level_V(sim::World world, const sim::RecordOptions& options) {
+/// The random walk at the first reading of the run.
+PerAxis<double> walk_until_run_V(sim::World world, const sim::RecordOptions& options) {
   world.adc.bits = 24;
-  const auto levels = [&] {
-    PerAxis<double> level{};
-    const MeasurementSet run = sim::record_set(world, options).run;
-    for (const Pose& pose : run.poses) {
-      for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-        double sum = 0;
-        for (std::size_t row = pose.first; row < pose.first + pose.count; ++row)
-          sum += run.samples.u_V[axis][row];
-        level[axis] += sum / static_cast<double>(pose.count * run.poses.size());
-      }
-    }
-    return level;
+  const auto first_reading_V = [&] {
+    const SampleTable samples = sim::record_set(world, options).run.samples;
+    PerAxis<double> reading{};
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) reading[axis] = samples.u_V[axis].front();
+    return reading;
   };
-  for (sim::NoiseTerms& noise : world.noise_V) noise.N = 0;
-  PerAxis<double> level = levels();
+  // White and slow noise are drawn apart, so that without the white one the slow one stays the
+  // same; flicker and walk are not, so that the flicker must go on, too small to be felt.
+  for (sim::NoiseTerms& noise : world.noise_V) noise = {.B = 1e-30, .K = noise.K};
+  PerAxis<double> walk = first_reading_V();
   for (sim::NoiseTerms& noise : world.noise_V) noise = {};
-  const PerAxis<double> quiet = levels();
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) level[axis] -= quiet[axis];
-  return level;
+  const PerAxis<double> quiet = first_reading_V();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) walk[axis] -= quiet[axis];
+  return walk;
 }
 
 UnitOutcome calibrate_unit(const sim::World& world, bool coloured, std::uint64_t seed,
@@ -79,7 +73,7 @@ UnitOutcome calibrate_unit(const sim::World& world, bool coloured, std::uint64_t
   options.soak_s = coloured ? 600 : 100;
   options.verification_poses = 0;
   const sim::RecordedSet set = sim::record_set(world, options);
-  const PerAxis<double> level_V = coloured ? slow_level_V(world, options) : PerAxis<double>{};
+  const PerAxis<double> walk_V = coloured ? walk_until_run_V(world, options) : PerAxis<double>{};
   const Calibration calibration = calibrate({set.run, &set.soak, set.description}, {});
 
   UnitOutcome outcome;
@@ -87,7 +81,7 @@ UnitOutcome calibrate_unit(const sim::World& world, bool coloured, std::uint64_t
   outcome.verdict = calibration.diagnosis.verdict;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const PerAxis<double>& K = set.truth.triad.K_V_per_g[axis];
-    const Eigen::Vector4d truth(K[0], K[1], K[2], set.truth.triad.U0_V[axis] + level_V[axis]);
+    const Eigen::Vector4d truth(K[0], K[1], K[2], set.truth.triad.U0_V[axis] + walk_V[axis]);
     const auto normalised_error = [&](const AxisEstimate& estimate) -> Eigen::Vector4d {
       return (estimate.value - truth).cwiseQuotient(estimate.covariance.diagonal().cwiseSqrt());
     };

@@ -2,8 +2,8 @@
 //
 // Nothing is undeclared, so the truth of a unit is exactly the 12 parameters it was drawn with: no
 // effect moves U0, the head is ideal, gravity is what the description says. Where the noise is
-// coloured, U0 is the level of the run: its slow noise averaged over the poses counts as part of
-// it.
+// coloured, U0 is the level from which the run started: how far the random walk came before counts
+// as part of it, what it did during the run and the flicker count as noise.
 #pragma once
 
 #include <Eigen/Core>
