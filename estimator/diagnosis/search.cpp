@@ -10,6 +10,7 @@
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/slow_look.h"
+#include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
@@ -303,7 +304,8 @@ class Search {
   void look_closer() {
     constexpr double kClearly = 10;
     const ActiveEffect& newcomer = stage_.fit.parameters.effects.back();
-    const std::vector<Hypothesis> closer = newcomer.effect->closer(input_.log, {newcomer.p});
+    const std::vector<Hypothesis> closer =
+        newcomer.effect->closer(input_.log, newcomer.axis, {newcomer.p});
     std::vector<EnlargedFit> fits(closer.size());
     parallel_for(fits.size(), [&](std::size_t k) {
       EnlargedParameters model = stage_.fit.parameters;
@@ -366,8 +368,10 @@ class Search {
       const Candidate& candidate = list_.candidates[c];
       if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
       tried = candidate.effect;
-      for (const Hypothesis& hypothesis : tried->in_one(repeated.effect->id(), p)) {
-        const ActiveEffect active = activate(*tried, candidate.axis, hypothesis);
+      std::vector<ActiveEffect> ones;
+      for (const Hypothesis& hypothesis : tried->in_one(repeated.effect->id(), p))
+        ones.push_back(activate(*tried, candidate.axis, hypothesis));
+      for (const ActiveEffect& active : likeliest(std::move(ones), without)) {
         const EnlargedFit with = fit_with(without.parameters, active);
         const auto dof = static_cast<int>(std::count(active.free.begin(), active.free.end(), true));
         const double cost = with.chi2 + price(c, dof);
@@ -380,6 +384,26 @@ class Search {
       }
     }
     return best && exchange(instances, *best);
+  }
+
+  /// Those that gain most beside a fit to first order, best first.
+  std::vector<ActiveEffect> likeliest(std::vector<ActiveEffect> effects,
+                                      const EnlargedFit& fit) const {
+    constexpr std::size_t kFew = 8;
+    if (effects.size() <= kFew) return effects;
+    const Eigen::MatrixXd model = orthonormal_basis(fit.whitened_jacobian);
+    const Eigen::VectorXd before_V = predict_stacked_V(input_.log, fit.parameters);
+    std::vector<std::pair<double, std::size_t>> loss;
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      Eigen::VectorXd response = stage_.whitening.apply(
+          predict_stacked_V(input_.log, with_effect(fit.parameters, effects[k])) - before_V);
+      response -= model * (model.transpose() * response);
+      loss.emplace_back(-std::abs(response.normalized().dot(fit.whitened_residual)), k);
+    }
+    std::sort(loss.begin(), loss.end());
+    std::vector<ActiveEffect> few;
+    for (std::size_t k = 0; k < kFew; ++k) few.push_back(std::move(effects[loss[k].second]));
+    return few;
   }
 
   int dof_of(std::size_t k) const {

@@ -12,7 +12,8 @@ class CodeStep final : public Effect {
   Subject subject() const override { return Subject::sensor; }
   bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"c", "V", ParameterRole::amplitude}, {"at", "V", ParameterRole::shape}};
+    constexpr double kFine_V = 2e-5;  // well within the noise that rounds the step off
+    return {{"c", "V", ParameterRole::amplitude}, {"at", "V", ParameterRole::shape, kFine_V, true}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
@@ -24,6 +25,15 @@ class CodeStep final : public Effect {
       starts.push_back({{1e-5, low + (high - low) * k / boundaries}});
     }
     return starts;
+  }
+  // Where few poses see the edge, the gain has several peaks.
+  std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
+                                 const Hypothesis& found) const override {
+    std::vector<Hypothesis> others;
+    for (const double sds : {0.5, 1.0, 1.5, 2.0, 3.0, 4.0})
+      for (const double side : {-1, 1})
+        others.push_back({{found.p[0], found.p[1] + side * sds * log.input_sd_V[axis]}});
+    return others;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double at_V = p[1];

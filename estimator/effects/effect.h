@@ -74,7 +74,10 @@ class Effect {
   virtual std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const = 0;
   /// Hypotheses close to `hypothesis`, too many to search among all the others; the one that the
   /// search chose is compared with these.
-  virtual std::vector<Hypothesis> closer(const VisitLog&, const Hypothesis&) const { return {}; }
+  virtual std::vector<Hypothesis> closer(const VisitLog&, std::size_t /*axis*/,
+                                         const Hypothesis&) const {
+    return {};
+  }
   /// Hypotheses that say in one what several `instances` of the effect `repeated` on the same axis
   /// say one by one; none where they have nothing in common.
   virtual std::vector<Hypothesis> in_one(const std::string& /*repeated*/,

@@ -262,11 +262,17 @@ class Pulses final : public FunctionOfDriver {
   }
   /// Steps up and down, some of which may not have been found.
   std::vector<Hypothesis> from_steps(const std::vector<std::vector<double>>& steps) const {
-    constexpr std::size_t kOften = 3;
-    if (steps.size() < kOften) return {};
     std::vector<double> up, down;
     for (const auto& step : steps) (step[0] > 0 ? up : down).push_back(step[1]);
     std::vector<Hypothesis> found;
+    if (up.size() == 1 && down.size() == 1) {
+      // Of one up and one down any period may be the right one.
+      constexpr int kMostPulses = 12, kParts = 10;
+      const auto [low, high] = range();
+      for (int k = kParts; k <= kParts * kMostPulses; ++k)
+        add_if_regular(up, down, (high - low) * kParts / k, found);
+      return found;
+    }
     for (const auto& same : {up, down})
       for (const double first : same)
         for (const double second : same)
@@ -357,7 +363,8 @@ class Step final : public FunctionOfDriver {
             {{low + (high - low) * k / kParts, share * (high - low), target().typical_size()}});
     return starts;
   }
-  std::vector<Hypothesis> closer(const VisitLog&, const Hypothesis& found) const override {
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
     for (const double ratio : {0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0})
       others.push_back({{found.p[0], ratio * found.p[1], found.p[2]}});

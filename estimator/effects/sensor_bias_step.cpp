@@ -23,7 +23,8 @@ class BiasStep final : public Effect {
     }
     return starts;
   }
-  std::vector<Hypothesis> closer(const VisitLog& log, const Hypothesis& found) const override {
+  std::vector<Hypothesis> closer(const VisitLog& log, std::size_t,
+                                 const Hypothesis& found) const override {
     std::vector<Hypothesis> within;
     for (std::size_t k = 0; k < log.visits.size(); ++k) {
       const bool after = log.visits[k].t_arrival_s == found.p[1];

@@ -43,6 +43,12 @@ TEST(DiagnosisStudy, ErrorOnLeftOutPosesIsNotThatOfTheUncertainties) {
   EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
+void expect_its_driver_and_no_listed_name(const SetOutcome& outcome) {
+  ASSERT_TRUE(outcome.feasible) << outcome.truth;
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.listed_instead, 0) << outcome.truth << " / " << outcome.found;
+}
+
 // The bias follows the temperature less its average of the past: seen over the whole run, that
 // looks like slow noise.
 TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
@@ -50,9 +56,7 @@ TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
                                       .effects = {"own.thermal_gradient"},
                                       .order = sim::RecordOrder::raster,
                                       .static_s = 1800});
-  ASSERT_TRUE(outcome.feasible);
-  EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.listed_instead, 0) << outcome.found;
+  expect_its_driver_and_no_listed_name(outcome);
   EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
 }
 
@@ -68,11 +72,22 @@ TEST(DiagnosisStudy, EffectsWithSharpShapesHaveTheirDriverAndNoListedName) {
                                         .noise = NoiseKind::examples,
                                         .bits = 16,
                                         .static_s = 1800});
-    ASSERT_TRUE(outcome.feasible) << effect;
-    EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
-    EXPECT_EQ(outcome.listed_instead, 0) << outcome.truth << " / " << outcome.found;
+    expect_its_driver_and_no_listed_name(outcome);
     EXPECT_LT(outcome.after.heldout, 1.2 * outcome.oracle.heldout) << outcome.truth;
   }
+}
+
+// Two of its edges were found first, as steps.
+TEST(DiagnosisStudy, WhatSwitchesOnAndOffIsATrainOfPulses) {
+  const SetOutcome outcome = run_set({.seed = 530001,
+                                      .effects = {"own.compressor"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 12,
+                                      .static_s = 300});
+  expect_its_driver_and_no_listed_name(outcome);
+  EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
 // What a product of components is on average has a listed name; together with what varies it is one
@@ -83,9 +98,7 @@ TEST(DiagnosisStudy, WhatVariesIsOneFindingWithItsMean) {
                                       .size = 3,
                                       .order = sim::RecordOrder::raster,
                                       .static_s = 1800});
-  ASSERT_TRUE(outcome.feasible);
-  EXPECT_EQ(outcome.driver_right, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.listed_instead, 0) << outcome.found;
+  expect_its_driver_and_no_listed_name(outcome);
   EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
@@ -118,6 +131,19 @@ void expect_only_finding(const SetOutcome& outcome) {
   ASSERT_TRUE(outcome.feasible);
   EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
+// The gain has several peaks over the place of a step that few poses see.
+TEST(DiagnosisStudy, ACodeStepIsPlacedWhereItGainsMost) {
+  const SetOutcome outcome = run_set({.seed = 620013,
+                                      .effects = {"adc.code_step"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::white,
+                                      .bits = 16,
+                                      .static_s = 300});
+  expect_only_finding(outcome);
+  EXPECT_EQ(outcome.parameters_within, outcome.parameters);
 }
 
 // Near the boundary slow noise decides on which side of the step a pose is: no pose is wrong there.
