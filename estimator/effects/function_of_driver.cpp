@@ -273,11 +273,22 @@ class Pulses final : public FunctionOfDriver {
         add_if_regular(up, down, (high - low) * kParts / k, found);
       return found;
     }
-    for (const auto& same : {up, down})
-      for (const double first : same)
-        for (const double second : same)
-          for (int pulses = 1; pulses <= 4 && second > first; ++pulses)
-            add_if_regular(up, down, (second - first) / pulses, found);
+    for (const auto* same : {&up, &down})
+      for (const double first : *same)
+        for (const double second : *same)
+          for (int pulses = 1; pulses <= 4 && second > first; ++pulses) {
+            const double period = (second - first) / pulses;
+            if (!up.empty() && !down.empty()) {
+              add_if_regular(up, down, period, found);
+              continue;
+            }
+            // Edges of one kind leave the width open.
+            for (const double share : kWidths)
+              if (same == &up)
+                add_if_regular(up, {first + share * period}, period, found);
+              else
+                add_if_regular({first - share * period}, down, period, found);
+          }
     return found;
   }
   /// The longest of several waves is the fundamental.
@@ -291,10 +302,11 @@ class Pulses final : public FunctionOfDriver {
     const double crest =
         longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
     std::vector<Hypothesis> found;
-    for (const double share : {0.2, 0.35, 0.5, 0.65, 0.8})
+    for (const double share : kWidths)
       found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
     return found;
   }
+  static constexpr double kWidths[] = {0.2, 0.35, 0.5, 0.65, 0.8};  // of a period
   void add_if_regular(const std::vector<double>& up, const std::vector<double>& down, double period,
                       std::vector<Hypothesis>& found) const {
     constexpr double kSame = 8;  // edges: two poses

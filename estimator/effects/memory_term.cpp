@@ -101,8 +101,8 @@ class Memory {
 
 class MemoryTerm final : public SmoothTerm {
  public:
-  MemoryTerm(std::shared_ptr<const Memory> memory, Target target)
-      : memory_(std::move(memory)), target_(target) {}
+  MemoryTerm(std::shared_ptr<const Memory> memory, Target target, double longest_s)
+      : memory_(std::move(memory)), target_(target), longest_s_(longest_s) {}
 
   std::string id() const override {
     return "unlisted:" + memory_->name() + ":" + to_string(target_.form);
@@ -137,6 +137,7 @@ class MemoryTerm final : public SmoothTerm {
     return starts;
   }
   double term_g(const TermInput& input, const double* p) const override {
+    if (p[3] > longest_s_) return 0;
     const double value = memory_->at(p[3], input.axis, input.visit);
     // What was remembered before the first visit, nobody saw.
     const double start = p[4] * effect::mean_decay(input.at(), p[2], p[3]);
@@ -146,11 +147,12 @@ class MemoryTerm final : public SmoothTerm {
  private:
   std::shared_ptr<const Memory> memory_;
   Target target_;
+  double longest_s_;
 };
 
 }  // namespace
 
-std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log,
+std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, double longest_s,
                                                       const DriverPointer& attitude,
                                                       const std::vector<DriverPointer>& columns) {
   std::vector<std::shared_ptr<const Memory>> memories = {
@@ -161,7 +163,7 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log,
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   for (const auto& memory : memories)
     for (const TermForm form : {TermForm::bias, TermForm::scale})
-      terms.push_back(std::make_unique<MemoryTerm>(memory, Target{form}));
+      terms.push_back(std::make_unique<MemoryTerm>(memory, Target{form}, longest_s));
   return terms;
 }
 

@@ -13,7 +13,10 @@ namespace plumbline {
 /// column, of a column less its average, which is its rate without the noise of a slope, and of the
 /// specific force of the own axis; added to the bias and to the scale. With and without a beginning
 /// that differs from what the first visit shows.
-std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log,
+///
+/// No τ beyond `longest_s`: what hardly changes over a run is not to be told from the 12
+/// parameters.
+std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, double longest_s,
                                                       const DriverPointer& attitude,
                                                       const std::vector<DriverPointer>& columns);
 

@@ -1,6 +1,7 @@
 #include "estimator/effects/smooth_term.h"
 
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "estimator/effects/driver.h"
@@ -121,7 +122,9 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   for (const Target& target : {of_delta, of_h, of_skew}) add(wave(turn, target, {0.2, 0.2, 6}));
   const auto attitude = std::make_shared<const Driver>(load(log));
   if (any || attitude->varies()) add(play(attitude, bias));
-  for (auto& term : memory_terms(log, attitude, columns)) add(std::move(term));
+  const double longest_s =
+      any ? std::numeric_limits<double>::infinity() : log.last_s() - log.first_s();
+  for (auto& term : memory_terms(log, longest_s, attitude, columns)) add(std::move(term));
   // What repeats from step to step, or every second step, is the rounding itself, or a bit.
   constexpr double kShortestWave = 2.5;  // steps
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
