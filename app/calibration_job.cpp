@@ -160,6 +160,7 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
   if (!description) return fail(description.error());
   job.description = *std::move(description);
   job.description.dut.serial = summary.header.serial;
+  job.description.goes_as_commanded = true;  // the drive is sent to absolute positions
   job.provenance.dut = job.description.dut;
   if (const auto rig = parse_rig_description(summary.header.config_toml, job.source); rig)
     job.reach = reach_of(*rig);

@@ -154,6 +154,9 @@ struct RunDescription {
   Grid grid;
   AngleUncertainty angles;
   std::optional<Limits> limits;
+  /// The head goes from one δ to the next as commanded, never the shorter way past 360°. Files do
+  /// not say so.
+  bool goes_as_commanded = false;
 };
 
 }  // namespace plumbline

@@ -19,7 +19,7 @@ class Backlash final : public Effect {
   std::vector<ParameterInfo> parameters() const override {
     // way 0: the head goes the shorter way round; 1: it never passes 360°. start: how it came to
     // its first angle: 0 with no play, 1 from δ = 0, 2 as in the first turn. Nothing recorded says
-    // so.
+    // so, but of a rig that ran the plan itself the way is known.
     return {{"w", "deg", ParameterRole::amplitude},
             {"way", "", ParameterRole::index},
             {"start", "", ParameterRole::index}};
@@ -27,8 +27,9 @@ class Backlash final : public Effect {
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     // Approached from one side only, backlash is a zero of the spindle.
     std::vector<Hypothesis> starts;
-    for (std::size_t way = 0; way < 2; ++way) {
-      bool forward = false, backward = false, new_way = way == 0;
+    const std::size_t first_way = log.goes_as_commanded ? 1 : 0;
+    for (std::size_t way = first_way; way < 2; ++way) {
+      bool forward = false, backward = false, new_way = way == first_way;
       for (const Visit& visit : log.visits) {
         forward |= visit.delta_direction[way] > 0;
         backward |= visit.delta_direction[way] < 0;

@@ -180,6 +180,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
   VisitLog log;
   log.gamma = description.gravity.local_mps2 / kStandardGravity_mps2;
   log.adc = description.adc;
+  log.goes_as_commanded = description.goes_as_commanded;
   log.has_temperature = !samples.temp_C.empty();
   for (const Covariate& covariate : samples.covariates) {
     log.covariate_names.push_back(covariate.name);

@@ -46,6 +46,7 @@ struct VisitLog {
   PerAxis<double> smallest_step_V{};        ///< smallest difference between two different readings
   PerAxis<double> lowest_V{}, highest_V{};  ///< of all readings
   std::optional<Adc> adc;
+  bool goes_as_commanded = false;          ///< RunDescription's
   PerAxis<std::optional<DwellLine>> line;  ///< that runs through the dwells
   /// What is looked for within a dwell beside its mean, for every number of samples that occurs:
   /// samples × dwell_contrasts(), orthonormal columns of zero sum; what a dwell cannot resolve is
