@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -276,6 +277,39 @@ TEST(VisitLog, AnotherClockOrAnotherRecordHasNoHistory) {
   log = example_log(23, 60);
   put_in_front(without_humidity, BetweenSets::nowhere, log);
   EXPECT_EQ(log.earlier, 0U);
+}
+
+// To and fro between 0 and 330° both ways are the same; fresh poses are not.
+TEST(Backlash, TheWayIsThatOfTheDriveWhereItIsKnown) {
+  const auto all = effect_catalogue();
+  const auto backlash = *std::find_if(
+      all.begin(), all.end(), [](const Effect* effect) { return effect->id() == "rig.backlash"; });
+  VisitLog log = example_log();
+  for (const int way : {0, 1}) {
+    log.goes_as_commanded = way == 1;
+    const auto hypotheses = backlash->hypotheses(log, 0);
+    ASSERT_FALSE(hypotheses.empty());
+    for (const Hypothesis& hypothesis : hypotheses) EXPECT_EQ(hypothesis.p[1], way);
+  }
+}
+
+// What hardly changes over a run would take the place of the 12 parameters.
+TEST(AverageOfThePast, ForgetsWithinTheRunThatIsSearched) {
+  const VisitLog log = example_log();
+  const double span_s = log.last_s() - log.first_s();
+  for (const auto selection :
+       {SmoothTermSelection::shown_by_these_visits, SmoothTermSelection::any}) {
+    int seen = 0;
+    for (const auto& term : smooth_terms(log, selection)) {
+      if (term->shape() != "straight line in the average of the past") continue;
+      ++seen;
+      ActiveEffect active = activate(*term, 0, term->hypotheses(log, 0).front());
+      EXPECT_GT(largest_change(log, active), 0);
+      active.p[3] = 1.1 * span_s;
+      EXPECT_EQ(largest_change(log, active) > 0, selection == SmoothTermSelection::any);
+    }
+    EXPECT_GT(seen, 4);
+  }
 }
 
 TEST(LegendreSeries, GoesStraightOnBeyondTheRange) {
