@@ -347,7 +347,7 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
 
 Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
                                const std::vector<PowersAllowance>& allowances) {
-  constexpr double kFewest = 2.5;  // degrees of freedom; of fewer hardly anything is known
+  constexpr double kFewest = 3;  // degrees of freedom; of fewer hardly anything is known
   constexpr double kMost = 1;    // of C: an expansion to second order says nothing beyond
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(C.rows());
