@@ -75,6 +75,7 @@ Corrected correct_readings(const CertifiedModel& model, const SampleTable& readi
     if (good) effects.push_back(active);
   }
   for (const std::string& name : restored.left_out) add_name(result.left_out, name);
+
   const std::vector<Eigen::Vector3d> bare_g = a_g;
   for (int pass = 0; pass < kRepetitions && !effects.empty(); ++pass) {
     std::vector<Eigen::Vector3d> next_g = bare_g;

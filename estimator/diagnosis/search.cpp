@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/slow_look.h"
-#include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
@@ -368,10 +368,12 @@ class Search {
       const Candidate& candidate = list_.candidates[c];
       if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
       tried = candidate.effect;
-      std::vector<ActiveEffect> ones;
+      CandidateList ones;
       for (const Hypothesis& hypothesis : tried->in_one(repeated.effect->id(), p))
-        ones.push_back(activate(*tried, candidate.axis, hypothesis));
-      for (const ActiveEffect& active : likeliest(std::move(ones), without)) {
+        ones.candidates.push_back(
+            {.effect = tried, .axis = candidate.axis, .hypothesis = hypothesis});
+      for (const Candidate& one : likeliest(ones, without)) {
+        const ActiveEffect active = one.active();
         const EnlargedFit with = fit_with(without.parameters, active);
         const auto dof = static_cast<int>(std::count(active.free.begin(), active.free.end(), true));
         const double cost = with.chi2 + price(c, dof);
@@ -387,22 +389,19 @@ class Search {
   }
 
   /// Those that gain most beside a fit to first order, best first.
-  std::vector<ActiveEffect> likeliest(std::vector<ActiveEffect> effects,
-                                      const EnlargedFit& fit) const {
+  std::vector<Candidate> likeliest(const CandidateList& list, const EnlargedFit& fit) const {
     constexpr std::size_t kFew = 8;
-    if (effects.size() <= kFew) return effects;
-    const Eigen::MatrixXd model = orthonormal_basis(fit.whitened_jacobian);
-    const Eigen::VectorXd before_V = predict_stacked_V(input_.log, fit.parameters);
-    std::vector<std::pair<double, std::size_t>> loss;
-    for (std::size_t k = 0; k < effects.size(); ++k) {
-      Eigen::VectorXd response = stage_.whitening.apply(
-          predict_stacked_V(input_.log, with_effect(fit.parameters, effects[k])) - before_V);
-      response -= model * (model.transpose() * response);
-      loss.emplace_back(-std::abs(response.normalized().dot(fit.whitened_residual)), k);
-    }
-    std::sort(loss.begin(), loss.end());
-    std::vector<ActiveEffect> few;
-    for (std::size_t k = 0; k < kFew; ++k) few.push_back(std::move(effects[loss[k].second]));
+    if (list.candidates.size() <= kFew) return list.candidates;
+    const CandidateResponses beside =
+        candidate_responses(input_.log, list, stage_.whitening, fit.parameters);
+    const Eigen::VectorXd gains = CandidateGains(beside, fit).of(fit.whitened_residual);
+    std::vector<std::size_t> order(list.candidates.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) {
+      return gains(static_cast<Eigen::Index>(k)) > gains(static_cast<Eigen::Index>(l));
+    });
+    std::vector<Candidate> few;
+    for (std::size_t k = 0; k < kFew; ++k) few.push_back(list.candidates[order[k]]);
     return few;
   }
 

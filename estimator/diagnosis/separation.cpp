@@ -51,6 +51,12 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
   return longer;
 }
 
+bool has_smooth_term(const EnlargedParameters& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const ActiveEffect& active) {
+    return dynamic_cast<const SmoothTerm*>(active.effect) != nullptr;
+  });
+}
+
 /// The model with `terms` in place of its own smooth terms, which know the visits of their log
 /// only.
 EnlargedParameters with_terms(const std::vector<std::unique_ptr<SmoothTerm>>& terms,
@@ -149,12 +155,14 @@ class Design {
          const std::vector<Alternative>& rivals)
       : log_(input.log),
         result_(result),
-        within_dwell_(has_effect_within_dwell(result.fit.parameters)) {
+        within_dwell_(has_effect_within_dwell(result.fit.parameters)),
+        smooth_terms_(has_smooth_term(result.fit.parameters)) {
     const Eigen::VectorXd found_V = predict_stacked_V(log_, result.fit.parameters);
     for (const Alternative& rival : rivals) {
       Contest contest;
       contest.rival = &rival.fit.parameters;
       within_dwell_ = within_dwell_ || has_effect_within_dwell(rival.fit.parameters);
+      smooth_terms_ = smooth_terms_ || has_smooth_term(rival.fit.parameters);
       contest.scale = rival.fit.whitened_jacobian.colwise().norm().cwiseInverse();
       const Eigen::MatrixXd J = rival.fit.whitened_jacobian * contest.scale.asDiagonal();
       const Eigen::VectorXd difference =
@@ -173,7 +181,8 @@ class Design {
   std::vector<Rows> rows(const std::vector<Stop>& stops, double samples_factor) const {
     const VisitLog log = extended(log_, stops, samples_factor);
     const NewRows rows = new_rows(samples_factor);
-    const auto terms = smooth_terms(log, SmoothTermSelection::any);
+    std::vector<std::unique_ptr<SmoothTerm>> terms;
+    if (smooth_terms_) terms = smooth_terms(log, SmoothTermSelection::any);
     const Eigen::VectorXd expected = rows.of(log, with_terms(terms, result_.fit.parameters));
     std::vector<Rows> all(contests_.size());
     parallel_for(contests_.size(), [&](std::size_t r) {
@@ -251,6 +260,7 @@ class Design {
   const VisitLog& log_;
   const SearchResult& result_;
   bool within_dwell_ = false;
+  bool smooth_terms_ = false;  ///< any of the models has some
   std::vector<Contest> contests_;
 };
 

@@ -273,22 +273,20 @@ class Pulses final : public FunctionOfDriver {
         add_if_regular(up, down, (high - low) * kParts / k, found);
       return found;
     }
-    for (const auto* same : {&up, &down})
-      for (const double first : *same)
-        for (const double second : *same)
-          for (int pulses = 1; pulses <= 4 && second > first; ++pulses) {
-            const double period = (second - first) / pulses;
-            if (!up.empty() && !down.empty()) {
-              add_if_regular(up, down, period, found);
-              continue;
-            }
-            // Edges of one kind leave the width open.
-            for (const double share : kWidths)
-              if (same == &up)
-                add_if_regular(up, {first + share * period}, period, found);
-              else
-                add_if_regular({first - share * period}, down, period, found);
-          }
+    const auto add_period = [&](double first, double period) {
+      if (!up.empty() && !down.empty()) return add_if_regular(up, down, period, found);
+      // Edges of one kind leave the width open.
+      for (const double share : kWidths)
+        if (down.empty())
+          add_if_regular(up, {first + share * period}, period, found);
+        else
+          add_if_regular({first - share * period}, down, period, found);
+    };
+    for (const auto& same : {up, down})
+      for (const double first : same)
+        for (const double second : same)
+          for (int pulses = 1; pulses <= 4 && second > first; ++pulses)
+            add_period(first, (second - first) / pulses);
     return found;
   }
   /// The longest of several waves is the fundamental.

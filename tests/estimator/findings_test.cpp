@@ -82,12 +82,16 @@ TEST(Findings, AnUnlistedFunctionOfTheOwnAxisLeavesItsSensitivityAlone) {
   EXPECT_LT(std::sqrt(x.covariance(0, 0)), 0.005 * data.truth[0][0]);
 }
 
-TEST(Findings, WhatHappenedOnceIsNoSlowNoise) {
+SyntheticOptions something_happened_to_x() {
   SyntheticOptions options;
   options.more_x_V = [](double, double t_s) {
     return 1e-3 * std::exp(-0.5 * std::pow((t_s - 150) / 9, 2));
   };
-  const Calibration result = calibrated(synthetic_run(5, kSixteenBits, options));
+  return options;
+}
+
+TEST(Findings, WhatHappenedOnceIsNoSlowNoise) {
+  const Calibration result = calibrated(synthetic_run(5, kSixteenBits, something_happened_to_x()));
   ASSERT_EQ(result.diagnosis.unlisted.size(), 1U) << result.diagnosis.reason;
   EXPECT_EQ(result.diagnosis.unlisted.front().driver, "t_s");
   EXPECT_EQ(result.diagnosis.unlisted.front().form, "bias");
@@ -270,12 +274,8 @@ TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
 }
 
 TEST(Findings, PosesTellRivalsApartBesideStructureWithoutAName) {
-  SyntheticOptions options;
-  options.more_x_V = [](double, double t_s) {
-    return 1e-3 * std::exp(-0.5 * std::pow((t_s - 150) / 9, 2));
-  };
   const Calibration alone = calibrated(square_on_z());
-  const Calibration beside = calibrated(square_on_z(options));
+  const Calibration beside = calibrated(square_on_z(something_happened_to_x()));
   ASSERT_EQ(beside.diagnosis.unlisted.size(), 1u) << beside.diagnosis.reason;
   ASSERT_EQ(beside.diagnosis.effects.size(), 1u) << beside.diagnosis.reason;
   const SeparatingPlan& plan = beside.diagnosis.effects.front().separating_plan;
