@@ -273,14 +273,13 @@ void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_pe
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
   u_floor_mps2 = 0;
 
-  const std::vector<Eigen::Index>& present = work.test.powers.present;
-  if (!work.noise_known || present.empty()) return;
-  Eigen::VectorXd slope(std::ssize(present));
+  const Eigen::MatrixXd& covariance = work.test.powers.covariance;
+  if (!work.noise_known || covariance.size() == 0) return;
+  Eigen::VectorXd slope(covariance.rows());
   for (Eigen::Index i = 0; i < slope.size(); ++i)
-    slope(i) = expected_mean_square_V2(
-        experiment.A, work.fit.gain,
-        experiment.processes.unit[static_cast<std::size_t>(present[static_cast<std::size_t>(i)])]);
-  const double variance = propagated_variance(work.test.powers.information, slope);
+    slope(i) = expected_mean_square_V2(experiment.A, work.fit.gain,
+                                       experiment.processes.unit[static_cast<std::size_t>(i)]);
+  const double variance = slope.dot(covariance * slope);
   u_floor_mps2 =
       std::abs(mps2_per_V) * std::sqrt(std::max(variance, 0.0)) / (2.0 * std::sqrt(mean_square));
 }

@@ -10,6 +10,7 @@
 
 #include "estimator/linear_algebra.h"
 #include "estimator/noise/nonnegative.h"
+#include "estimator/noise/powers_posterior.h"
 #include "estimator/noise/square.h"
 
 namespace plumbline {
@@ -220,17 +221,22 @@ NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power) const {
 
 NoisePool::Point NoisePool::evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
-  Point point = record_at(power);
   const Projector projector = make_projector(lower_covariance(power), design);
   const Eigen::VectorXd py = projector.P * mean;
+  Point point = scoring_step(power, projector.P, py);
   point.deviance += projector.log_determinant + mean.dot(py);
   point.likelihood_deviance = point.deviance - projector.log_determinant_of_design;
+  return point;
+}
+
+NoisePool::Point NoisePool::scoring_step(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
+                                         const Eigen::VectorXd& py) const {
+  Point point = record_at(power);
   // The average information (Gilmour, Thompson & Cullis, 1995) has the expected one's mean and
   // costs products with vectors only.
-  const Seen seen = see(projector.P, py);
+  const Seen seen = see(P, py);
   const Eigen::VectorXd score = seen.unit_times_py.transpose() * py - seen.trace;
-  const Eigen::MatrixXd normal =
-      seen.unit_times_py.transpose() * (projector.P * seen.unit_times_py);
+  const Eigen::MatrixXd normal = seen.unit_times_py.transpose() * (P * seen.unit_times_py);
   point.normal += normal;
   point.right += normal * power + score;
   return point;
@@ -282,32 +288,21 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
 EstimatedPowers NoisePool::estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
                                      const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
-  EstimatedPowers powers{found.power, {}, {}, gain_of_slow_noise(found, mean, design)};
-  for (Eigen::Index i = 0; i < found.power.size(); ++i)
-    if (found.power(i) > 0) powers.present.push_back(i);
-  powers.information = information_of(found.power, P, powers.present);
-  return powers;
+  Point point = scoring_step(found.power, P, P * mean);
+  if (!quantization_is_free()) {
+    point.normal.row(kTermQ).setZero();
+    point.normal.col(kTermQ).setZero();
+  }
+  return {found.power, covariance_of_powers(0.5 * point.normal, 0.5 * point.right),
+          gain_of_slow_noise(found, mean, design)};
 }
 
 namespace {
 
-/// Of a matrix that may not determine everything: what is not determined is left out.
-Eigen::MatrixXd inverse_of_information(const Eigen::MatrixXd& information) {
-  constexpr double kDetermined = 1e-6;
-  const Eigen::VectorXd scale = information.diagonal().unaryExpr(
-      [](double value) { return value > 0 ? 1 / std::sqrt(value) : 0; });
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * information *
-                                                             scale.asDiagonal());
-  Eigen::VectorXd inverse = eigen.eigenvalues();
-  for (double& value : inverse) value = value > kDetermined ? 1 / value : 0;
-  return scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
-         eigen.eigenvectors().transpose() * scale.asDiagonal();
-}
-
 /// Probability that there is slow noise at all: the odds by likelihood against a price for what
 /// powers that cannot be negative gain by chance.
 double probability_of_slow_noise(double gain) {
-  constexpr double kPrice = 5;  // of −2 ln L: in white noise the gain exceeds it one time in 20
+  constexpr double kPrice = 8;  // of −2 ln L: in white noise the gain exceeds it one time in 60
   return 1 / (1 + std::exp(0.5 * (kPrice - gain)));
 }
 
@@ -318,24 +313,23 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
                                      const Eigen::MatrixXd& C) {
   const Eigen::Index p = C.rows();
   PowersAllowance result{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
-  if (powers.present.empty()) return result;
+  const Eigen::Index count = powers.power.size();
+  if (count == 0) return result;
   const Eigen::LLT<Eigen::MatrixXd> factor(V);
   const Eigen::MatrixXd B = factor.solve(X);
-  const auto count = std::ssize(powers.present);
   std::vector<Eigen::MatrixXd> P, Z;  // −∂(X'V⁻¹X) by each power; L⁻¹ times what it does to B
   Eigen::MatrixXd slope(p, count);  // of the diagonal of C
-  for (const Eigen::Index i : powers.present) {
+  for (Eigen::Index i = 0; i < count; ++i) {
     const Eigen::MatrixXd moved = processes.unit[static_cast<std::size_t>(i)] * B;
     P.emplace_back(B.transpose() * moved);
-    slope.col(std::ssize(P) - 1) = (C * P.back() * C).diagonal();
+    slope.col(i) = (C * P.back() * C).diagonal();
     Z.emplace_back(factor.matrixL().solve(moved));
   }
-  const Eigen::MatrixXd W = inverse_of_information(powers.information);
+  const Eigen::MatrixXd& W = powers.covariance;
   const double slow = probability_of_slow_noise(powers.gain_of_slow);
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto a = static_cast<std::size_t>(i);
-    const Eigen::Index process = powers.present[a];
-    if (process >= kFirstSlow) result.M -= (1 - slow) * powers.power(process) * P[a];
+    if (i >= kFirstSlow) result.M -= (1 - slow) * powers.power(i) * P[a];
     for (Eigen::Index j = 0; j < count; ++j) {
       const auto b = static_cast<std::size_t>(j);
       result.M += 2 * slow * W(i, j) * (Z[a].transpose() * Z[b] - P[a] * C * P[b]);
@@ -387,9 +381,8 @@ Eigen::VectorXd NoisePool::starting_powers() const {
 PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                             const Eigen::VectorXd* start) const {
   assert(mean.size() == design.rows() && mean.size() > design.cols());
-  // The means cannot tell quantization from white noise: without a record it stays at zero.
   std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
-  free[kTermQ] = densities_.size() > 0;
+  free[kTermQ] = quantization_is_free();
   Eigen::VectorXd first = starting_powers();
   if (!free[kTermQ]) first(kTermQ) = 0;
   // Powers that were found to be zero need a little to find the way back.
@@ -403,7 +396,7 @@ double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::Vect
   first.tail(first.size() - kFirstSlow).setZero();
   if (first.sum() <= 0 && !own_noise_) return std::numeric_limits<double>::infinity();
   std::vector<bool> free(static_cast<std::size_t>(first.size()), false);
-  free[kTermQ] = densities_.size() > 0;
+  free[kTermQ] = quantization_is_free();
   free[kTermN] = true;
   return climb(first, free, mean, design).deviance - found.deviance;
 }

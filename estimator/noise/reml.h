@@ -33,12 +33,11 @@ struct PooledNoise {
   bool converged = false;
 };
 
-/// Powers that were estimated, and what is known of them.
+/// Powers that were estimated, and what is known of them. Empty where nothing was estimated.
 struct EstimatedPowers {
-  Eigen::VectorXd power;              ///< one per process
-  std::vector<Eigen::Index> present;  ///< those that are not zero, ascending
-  Eigen::MatrixXd information;        ///< about those, the others held at zero
-  double gain_of_slow = 0;            ///< of −2 ln L, by the slow ones among them
+  Eigen::VectorXd power;       ///< one per process
+  Eigen::MatrixXd covariance;  ///< of all of them, those estimated at zero included
+  double gain_of_slow = 0;     ///< of −2 ln L, by the slow ones among them
 };
 
 /// Restricted maximum likelihood (Patterson & Thompson, 1971) of the powers, all ≥ 0, given window
@@ -57,7 +56,8 @@ class NoisePool {
   PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                    const Eigen::VectorXd* start = nullptr) const;
   /// What is known of the powers that pool() found for this mean and design; P is the projector of
-  /// their Σ and of the design.
+  /// their Σ and of the design. The likelihood is taken to second order about them, and
+  /// covariance_of_powers() of that.
   EstimatedPowers estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
                             const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
   /// Expected information of both sources about the `wanted` powers, the others held, where the
@@ -75,9 +75,14 @@ class NoisePool {
   Point record_at(const Eigen::VectorXd& power) const;
   Eigen::MatrixXd lower_covariance(const Eigen::VectorXd& power) const;
   Seen see(const Eigen::MatrixXd& P, const Eigen::VectorXd& py) const;
+  /// `normal` and `right` of both sources; P is the projector of the powers' Σ and of the design.
+  Point scoring_step(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
+                     const Eigen::VectorXd& py) const;
   Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                  const Eigen::MatrixXd& design) const;
   Eigen::VectorXd starting_powers() const;
+  /// The window means cannot tell quantization from white noise: without a record it stays at zero.
+  bool quantization_is_free() const { return densities_.size() > 0; }
   /// By how much −2 ln of the restricted likelihood is better with the slow processes of `found`
   /// than without any.
   double gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,

@@ -149,7 +149,8 @@ TEST(MeanCovariance, HandWorkedDiagonals) {
   EXPECT_NEAR(unit[kTermK](1, 1), 10 + 30.0 / 16, 1e-14);
   EXPECT_NEAR(unit[kTermK](0, 1), 2.5, 1e-14);
   // Mean of ln|t − s| over one window of width w is ln w − 3/2; five spans are 70 s.
-  EXPECT_NEAR(unit[kTermB](0, 0), (std::log(70.0) - std::log(4.0) + 1.5) / std::numbers::pi, 1e-12);
+  EXPECT_NEAR(unit[kTermB](0, 0), (std::log(3 * 14.0) - std::log(4.0) + 1.5) / std::numbers::pi,
+              1e-12);
 }
 
 TEST(MeanCovariance, FlickerAllanVarianceOfNeighbours) {
@@ -260,13 +261,14 @@ TEST(AllowanceForPowers, OnePowerScalesEverythingAndMovesNothing) {
   const Eigen::MatrixXd C =
       (run.design.transpose() * V.llt().solve(run.design)).llt().solve(Eigen::Matrix4d::Identity());
   const Eigen::VectorXd power = Eigen::VectorXd::Unit(one.count(), kTermK);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(one.count(), one.count());
   // The power is 1 with a standard deviation of 0.2: 50 degrees of freedom.
-  const PowersAllowance allowance = allowance_for_powers(
-      one, {power, {kTermK}, Eigen::MatrixXd::Constant(1, 1, 25), 1e3}, V, run.design, C);
+  covariance(kTermK, kTermK) = 0.04;
+  const PowersAllowance allowance =
+      allowance_for_powers(one, {power, covariance, 1e3}, V, run.design, C);
   EXPECT_LT((C * allowance.M * C).norm(), 1e-9 * C.norm());
   EXPECT_LT((with_allowance(C, {allowance}) - C * 50 / 48).norm(), 1e-9 * C.norm());
-  const PowersAllowance nothing =
-      allowance_for_powers(one, {power, {}, Eigen::MatrixXd(0, 0), 0}, V, run.design, C);
+  const PowersAllowance nothing = allowance_for_powers(one, {}, V, run.design, C);
   EXPECT_EQ(with_allowance(C, {nothing}), C) << "noise that is known needs none";
 }
 
@@ -283,11 +285,12 @@ TEST(AllowanceForPowers, SlowNoiseThatMayNotBeThereCountsAsFarAsItIsLikely) {
   const Eigen::MatrixXd white_V = 1e-8 * processes.unit[kTermN];
   const Eigen::MatrixXd V = white_V + 1e-8 * processes.unit[kTermK];
   const Eigen::Matrix4d C = covariance_under(V);
-  Eigen::MatrixXd information = Eigen::Matrix2d::Zero();
-  information.diagonal() << 1e20, 1e18;
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(power.size(), power.size());
+  covariance(kTermN, kTermN) = 1e-20;
+  covariance(kTermK, kTermK) = 1e-18;
   const auto variance_at_gain = [&](double gain) {
-    const EstimatedPowers powers{power, {kTermN, kTermK}, information, gain};
-    return with_allowance(C, {allowance_for_powers(processes, powers, V, run.design, C)})(2, 2);
+    return with_allowance(
+        C, {allowance_for_powers(processes, {power, covariance, gain}, V, run.design, C)})(2, 2);
   };
   const double white = covariance_under(white_V)(2, 2);
   EXPECT_GT(variance_at_gain(0), white);
@@ -295,7 +298,7 @@ TEST(AllowanceForPowers, SlowNoiseThatMayNotBeThereCountsAsFarAsItIsLikely) {
   EXPECT_GT(variance_at_gain(30), C(2, 2));
   // Powers of which next to nothing is known make nothing of the estimates:
   // doubled, and Student's t of three degrees of freedom.
-  information.diagonal() << 1e20, 1e10;
+  covariance(kTermK, kTermK) = 1e-10;
   EXPECT_LT(variance_at_gain(30), 6.01 * C(2, 2));
 }
 
