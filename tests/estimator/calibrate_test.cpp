@@ -183,7 +183,7 @@ TEST(Calibrate, RoundingWithoutNoiseIsNotAveragedAway) {
   // The run alone has to say that there is no slow noise, and 60 poses say so within limits.
   const double independent_V = kTwelveBits.lsb_V() / std::sqrt(12.0 * 60);
   const double u_U0_V = std::sqrt(result.estimates.batch_ls[0].covariance(3, 3));
-  EXPECT_GT(u_U0_V, 1.2 * independent_V);
+  EXPECT_GT(u_U0_V, 1.1 * independent_V);
   EXPECT_LT(u_U0_V, 4.0 * independent_V);
 }
 
