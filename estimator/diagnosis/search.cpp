@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "estimator/diagnosis/edge_comb.h"
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
@@ -57,7 +58,7 @@ class Search {
     while (chosen_.size() < options_.max_effects) {
       const std::size_t before = chosen_.size();
       const bool found = add_one();
-      if (!found && !(worth_slow_look && add_slow_one())) break;
+      if (!found && !(worth_slow_look && add_slow_one()) && !add_train()) break;
       drop_superfluous();
       tell_in_one();
       if (!found) worth_slow_look = chosen_.size() > before;
@@ -344,6 +345,15 @@ class Search {
   void tell_in_one() {
     for (std::size_t k = 0; k < chosen_.size(); ++k) {
       const Candidate& first = list_.candidates[chosen_[k]];
+      if (is_step(first)) {
+        const std::vector<std::size_t> steps = of_regular_steps(first.axis);
+        const auto first_step = std::find_if(steps.begin(), steps.end(), [&](std::size_t l) {
+          return is_step(list_.candidates[chosen_[l]]);
+        });
+        if (k == *first_step && steps.size() > 1 && put_train_in_place_of(steps, first.axis))
+          return;
+        continue;
+      }
       std::vector<std::size_t> instances;
       std::vector<std::vector<double>> p;
       for (std::size_t l = k; l < chosen_.size(); ++l) {
@@ -352,13 +362,63 @@ class Search {
         instances.push_back(l);
         p.push_back(stage_.fit.parameters.effects[l].p);
       }
-      if (instances.size() > 1 && replace_in_one(instances, p)) return;
+      if (instances.size() > 1 && replace_in_one(instances, first, p, looks_)) return;
     }
   }
 
-  bool replace_in_one(const std::vector<std::size_t>& instances,
-                      const std::vector<std::vector<double>>& p) {
-    const Candidate& repeated = list_.candidates[chosen_[instances.front()]];
+  /// Steps at regular times that say nothing one by one.
+  bool add_train() {
+    // One that takes the place of another could be followed by that again.
+    constexpr int kMostTrains = 6;
+    if (trains_ == kMostTrains) return false;
+    ++trains_;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const std::vector<std::size_t> found = of_regular_steps(axis);
+      if (put_train_in_place_of(found, axis)) return true;
+      // What stepped by itself may stay beside it, another train not.
+      if (!found.empty() &&
+          std::all_of(found.begin(), found.end(),
+                      [&](std::size_t k) { return is_step(list_.candidates[chosen_[k]]); }) &&
+          put_train_in_place_of({}, axis))
+        return true;
+    }
+    return false;
+  }
+
+  static bool is_step(const Candidate& candidate) {
+    return candidate.effect->id() == "sensor.bias_step";
+  }
+  /// What the model holds of an axis that steps: steps one by one, and trains of them.
+  std::vector<std::size_t> of_regular_steps(std::size_t axis) const {
+    const std::vector<std::vector<double>> any_train = {{1, 0}, {1, 1}, {-1, 0.5}};
+    std::vector<std::size_t> found;
+    for (std::size_t k = 0; k < chosen_.size(); ++k) {
+      const Candidate& chosen = list_.candidates[chosen_[k]];
+      if (chosen.axis == axis &&
+          (is_step(chosen) || !chosen.effect->in_one("sensor.bias_step", any_train).empty()))
+        found.push_back(k);
+    }
+    return found;
+  }
+  bool put_train_in_place_of(const std::vector<std::size_t>& instances, std::size_t axis) {
+    constexpr double kRefined = 1.3;  // by which a train may gain more when its edges move
+    const EnlargedFit without = fit_without(instances);
+    if (!without.determined) return false;
+    const auto comb = regular_steps(list_, responses(), without, axis);
+    if (!comb) return false;
+    const double looks = static_cast<double>(kAxisCount) * comb->looks;
+    if (p_of_search(log_chi_squared_tail(kRefined * comb->gain, 1), looks) > options_.false_alarm)
+      return false;
+    const double size = comb->size, up_s = comb->first_up_s;
+    return replace_in_one(
+        instances, list_.candidates[comb->first_step],
+        {{size, up_s}, {size, up_s + comb->period_s}, {-size, up_s + comb->width_s}}, looks);
+  }
+
+  /// One candidate in the place of the `instances` of the candidate `repeated`, whose parameters
+  /// are `p`; of all that could be one, so many were looked at.
+  bool replace_in_one(const std::vector<std::size_t>& instances, const Candidate& repeated,
+                      const std::vector<std::vector<double>>& p, double looks) {
     const EnlargedFit without = fit_without(instances);
     if (!without.determined) return false;
     const Effect* tried = nullptr;
@@ -379,7 +439,7 @@ class Search {
         const double cost = with.chi2 + price(c, dof);
         if (!with.determined || cost >= best_cost) continue;
         const double p_value = p_of_search(
-            log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks_);
+            log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks);
         if (p_value > options_.false_alarm) continue;
         best_cost = cost;
         best = {c, p_value, with.parameters};
@@ -525,6 +585,7 @@ class Search {
   double looks_ = 0;
   double p_best_rest_ = 1;
   int exchanges_ = 0;
+  int trains_ = 0;  ///< looked for
 };
 
 }  // namespace

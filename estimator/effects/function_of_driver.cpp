@@ -260,34 +260,12 @@ class Pulses final : public FunctionOfDriver {
     const auto [low, high] = range();
     return kPart * (high - low) / static_cast<double>(variable().value[0].size());
   }
-  /// Steps up and down, some of which may not have been found.
+  /// Two steps, a period apart, and one back.
   std::vector<Hypothesis> from_steps(const std::vector<std::vector<double>>& steps) const {
-    std::vector<double> up, down;
-    for (const auto& step : steps) (step[0] > 0 ? up : down).push_back(step[1]);
-    std::vector<Hypothesis> found;
-    if (up.size() == 1 && down.size() == 1) {
-      // Of one up and one down any period may be the right one.
-      constexpr int kMostPulses = 12, kParts = 10;
-      const auto [low, high] = range();
-      for (int k = kParts; k <= kParts * kMostPulses; ++k)
-        add_if_regular(up, down, (high - low) * kParts / k, found);
-      return found;
-    }
-    const auto add_period = [&](double first, double period) {
-      if (!up.empty() && !down.empty()) return add_if_regular(up, down, period, found);
-      // Edges of one kind leave the width open.
-      for (const double share : kWidths)
-        if (down.empty())
-          add_if_regular(up, {first + share * period}, period, found);
-        else
-          add_if_regular({first - share * period}, down, period, found);
-    };
-    for (const auto& same : {up, down})
-      for (const double first : same)
-        for (const double second : same)
-          for (int pulses = 1; pulses <= 4 && second > first; ++pulses)
-            add_period(first, (second - first) / pulses);
-    return found;
+    if (steps.size() != 3) return {};
+    const double size = steps[0][0], first_s = steps[0][1];
+    const double width_s = steps[2][1] - first_s;
+    return {{{edge(), steps[1][1] - first_s, width_s, first_s + 0.5 * width_s, size}}};
   }
   /// The longest of several waves is the fundamental.
   std::vector<Hypothesis> from_waves(const std::vector<std::vector<double>>& waves) const {
@@ -300,21 +278,9 @@ class Pulses final : public FunctionOfDriver {
     const double crest =
         longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
     std::vector<Hypothesis> found;
-    for (const double share : kWidths)
+    for (const double share : {0.2, 0.35, 0.5, 0.65, 0.8})  // of a period
       found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
     return found;
-  }
-  static constexpr double kWidths[] = {0.2, 0.35, 0.5, 0.65, 0.8};  // of a period
-  void add_if_regular(const std::vector<double>& up, const std::vector<double>& down, double period,
-                      std::vector<Hypothesis>& found) const {
-    constexpr double kSame = 8;  // edges: two poses
-    if (up.empty() || down.empty() || period < 4 * kSame * edge()) return;
-    for (const auto& same : {up, down})
-      for (const double t : same)
-        if (std::abs(std::remainder(t - same.front(), period)) > kSame * edge()) return;
-    double width = std::fmod(down.front() - up.front(), period);
-    if (width < 0) width += period;
-    found.push_back({{edge(), period, width, up.front() + 0.5 * width, target().typical_size()}});
   }
 };
 

@@ -179,10 +179,6 @@ struct NaiveResult {
 };
 NaiveResult search_naively(const StudySet& set);
 
-SetOutcome run_set(const SetDesign& design);
-/// Scores a calibration of a set; run_set() is make_set(), calibrate() and this.
-SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration& calibration);
-
 /// Writes the set as files that the command line program reads.
 Result<void> dump(const StudySet& set, const std::string& folder);
 

@@ -189,6 +189,21 @@ TEST(DiagnosisStudy, AStuckBitOfACoarseConverterIsTheOnlyFinding) {
   EXPECT_LT(outcome.after.fresh, 1.5 * outcome.oracle.fresh);
 }
 
+// Not one of the edges can be told from the slow noise; all of them can.
+TEST(DiagnosisStudy, APumpInStrongSlowNoiseIsFoundByItsRegularity) {
+  const SetOutcome outcome = run_set({.seed = 760005,
+                                      .effects = {"own.compressor"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 12,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
+}
+
 // The covariance that the oracle uses is the one that the simulated noise has.
 TEST(DiagnosisStudy, TrueCovariancePredictsTheResidualOfPlainSets) {
   for (const NoiseKind kind : {NoiseKind::white, NoiseKind::examples, NoiseKind::coloured}) {
