@@ -10,7 +10,7 @@ namespace plumbline {
 namespace {
 
 /// Spans over which flicker noise averages to the level that is meant by U₀.
-constexpr double kFlickerReach = 3;
+constexpr double kFlickerReach = 2;
 
 double duration_s(const SampleWindow& w) { return static_cast<double>(w.count) * w.step_s; }
 double begin_s(const SampleWindow& w) { return w.first_s - w.step_s; }

@@ -28,8 +28,8 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
 /// Windows must follow one another in time without overlap. Each sample is taken as the mean over
 /// its own step (the convention of the Allan variance). The non-stationary terms need an origin,
 /// which is only felt in the constant that every model here has as a free parameter:
-/// - flicker: (1/π)·ln(τ_c/|τ|), averaged over both windows in closed form, with τ_c three times
-///   the span of all windows: the constant is the level over some such runs, not over this one
+/// - flicker: (1/π)·ln(τ_c/|τ|), averaged over both windows in closed form, with τ_c twice
+///   the span of all windows: the constant is the level over two such runs, not over this one
 ///   alone. Positive definite, since τ_c exceeds the span's logarithmic capacity (span/4);
 /// - random walk: starts at zero one step before the first window; with walk_decay_per_s > 0 it is
 ///   a stationary first-order Gauss-Markov process, exp(−|τ|·decay)/(2·decay), averaged likewise;
