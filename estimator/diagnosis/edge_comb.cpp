@@ -18,9 +18,12 @@ constexpr std::ptrdiff_t kFewToRefine = 12;
 class Comb {
  public:
   Comb(const std::vector<double>& at_s, double period_s, double phase_s) {
-    const double first = std::ceil((at_s.front() - phase_s) / period_s);
-    for (double t_s = phase_s + first * period_s; t_s <= at_s.back(); t_s += period_s)
-      steps.push_back(std::lower_bound(at_s.begin(), at_s.end(), t_s) - at_s.begin());
+    const auto first = static_cast<long>(std::ceil((at_s.front() - phase_s) / period_s));
+    const auto last = static_cast<long>(std::floor((at_s.back() - phase_s) / period_s));
+    for (long j = first; j <= last; ++j) {
+      const double t_s = phase_s + static_cast<double>(j) * period_s;
+      steps.push_back(std::lower_bound(at_s.begin(), at_s.end() - 1, t_s) - at_s.begin());
+    }
   }
   std::vector<Eigen::Index> steps;
 };
@@ -70,8 +73,10 @@ std::optional<EdgeComb> best_edge_comb(const std::vector<double>& at_s,
   const double distance_s = span_s / static_cast<double>(at_s.size() - 1);
   std::vector<EdgeComb> trains;  // one for each period and width
   double looks = 0;
-  for (double period_s = kShortestPeriod * distance_s; period_s < span_s / 1.5;
-       period_s *= 1 + 2 * distance_s / span_s) {
+  const double shortest_s = kShortestPeriod * distance_s, ratio = 1 + 2 * distance_s / span_s;
+  const auto periods = std::lround(std::log(span_s / 1.5 / shortest_s) / std::log(ratio));
+  for (long k = 0; k < periods; ++k) {
+    const double period_s = shortest_s * std::pow(ratio, static_cast<double>(k));
     const auto phases = std::min(kMostPhases, static_cast<int>(std::lround(period_s / distance_s)));
     std::vector<Comb> combs;
     std::vector<double> product;
