@@ -177,9 +177,29 @@ Eigen::MatrixXd CandidateResponses::Group::products(const Eigen::MatrixXd& stack
   return result;
 }
 
-CandidateResponses candidate_responses(const VisitLog& log, const CandidateList& list,
-                                       const PoseWhitening& whitening,
-                                       const EnlargedParameters& model) {
+namespace {
+
+struct Block {  // of neighbouring columns of a group
+  std::size_t group;
+  Eigen::Index first, count;
+};
+std::vector<Block> blocks_of(const CandidateResponses& responses) {
+  constexpr Eigen::Index kColumns = 192;
+  std::vector<Block> blocks;
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    const Eigen::Index columns = responses.groups[g].means.cols();
+    for (Eigen::Index first = 0; first < columns; first += kColumns)
+      blocks.push_back({g, first, std::min(kColumns, columns - first)});
+  }
+  return blocks;
+}
+
+std::size_t first_axis(std::size_t group) { return is_head(group) ? 0 : group % kAxisCount; }
+
+}  // namespace
+
+CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateList& list,
+                                         const EnlargedParameters& model) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   CandidateResponses responses;
   std::array<std::vector<ActiveEffect>, kGroups> singles;
@@ -189,25 +209,18 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
     responses.place.push_back({group, std::ssize(singles[group]), std::ssize(own)});
     singles[group].insert(singles[group].end(), own.begin(), own.end());
   }
-  const Baseline base{log, model, head_geometries(log, model), specific_forces_g(log, model)};
-  struct Block {
-    std::size_t group;
-    Eigen::Index first, count;
-  };
-  std::vector<Block> blocks;  // of neighbouring columns
   for (std::size_t g = 0; g < kGroups; ++g) {
     CandidateResponses::Group& group = responses.groups[g];
     const Eigen::Index columns = std::ssize(singles[g]);
-    const auto axis = static_cast<Eigen::Index>(is_head(g) ? 0 : g % kAxisCount);
+    const auto axis = static_cast<Eigen::Index>(first_axis(g));
     const Eigen::Index rows = is_head(g) ? mean_rows(log) : n;
     group.first_row = axis * n;
     group.means.resize(rows, columns);
     group.first_dwell_row = mean_rows(log) + axis * log.dwell_contrasts() * n;
     group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * rows : 0, columns);
-    constexpr Eigen::Index kColumns = 192;
-    for (Eigen::Index first = 0; first < columns; first += kColumns)
-      blocks.push_back({g, first, std::min(kColumns, columns - first)});
   }
+  const Baseline base{log, model, head_geometries(log, model), specific_forces_g(log, model)};
+  const std::vector<Block> blocks = blocks_of(responses);
   parallel_for(blocks.size(), [&](std::size_t b) {
     const auto& [g, first, count] = blocks[b];
     CandidateResponses::Group& group = responses.groups[g];
@@ -224,7 +237,19 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
         if (is_within_dwell(g)) set_dwell_response(base, single, dwells.col(j));
       }
     }
-    const std::size_t axis = is_head(g) ? 0 : g % kAxisCount;
+  });
+  return responses;
+}
+
+CandidateResponses whitened(CandidateResponses responses_V, const VisitLog& log,
+                            const PoseWhitening& whitening) {
+  const auto n = static_cast<Eigen::Index>(log.visits.size());
+  const std::vector<Block> blocks = blocks_of(responses_V);
+  parallel_for(blocks.size(), [&](std::size_t b) {
+    const auto& [g, first, count] = blocks[b];
+    auto means = responses_V.groups[g].means.middleCols(first, count);
+    auto dwells = responses_V.groups[g].dwells.middleCols(first, count);
+    const std::size_t axis = first_axis(g);
     const Eigen::Index contrasts = log.dwell_contrasts();
     for (Eigen::Index row = 0; row < means.rows(); row += n)
       whitening.apply_to_means(axis + static_cast<std::size_t>(row / n), means.middleRows(row, n));
@@ -232,7 +257,30 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
       dwells.middleRows(d * n, n) /=
           whitening.dwell_sd_V[axis + static_cast<std::size_t>(d / contrasts)](d % contrasts);
   });
-  return responses;
+  return responses_V;
+}
+
+CandidateResponses candidate_responses(const VisitLog& log, const CandidateList& list,
+                                       const PoseWhitening& whitening,
+                                       const EnlargedParameters& model) {
+  return whitened(candidate_responses_V(log, list, model), log, whitening);
+}
+
+CandidateResponses some_of(const CandidateResponses& responses,
+                           const std::vector<std::size_t>& candidates) {
+  CandidateResponses some;
+  std::array<std::vector<Eigen::Index>, kGroups> columns;
+  for (const std::size_t c : candidates) {
+    const auto& [g, first, count] = responses.place[c];
+    some.place.push_back({g, std::ssize(columns[g]), count});
+    for (Eigen::Index j = 0; j < count; ++j) columns[g].push_back(first + j);
+  }
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    const CandidateResponses::Group& whole = responses.groups[g];
+    some.groups[g] = {whole.first_row, whole.means(Eigen::all, columns[g]), whole.first_dwell_row,
+                      whole.dwells(Eigen::all, columns[g])};
+  }
+  return some;
 }
 
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)

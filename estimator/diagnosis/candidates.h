@@ -68,6 +68,15 @@ CandidateResponses candidate_responses(const VisitLog& log, const CandidateList&
                                        const PoseWhitening& whitening,
                                        const EnlargedParameters& model);
 
+/// The same before they are whitened, V.
+CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateList& list,
+                                         const EnlargedParameters& model);
+CandidateResponses whitened(CandidateResponses responses_V, const VisitLog& log,
+                            const PoseWhitening& whitening);
+/// Those of some of the candidates.
+CandidateResponses some_of(const CandidateResponses& responses,
+                           const std::vector<std::size_t>& candidates);
+
 /// By how much each candidate would improve a fitted model, to first order.
 class CandidateGains {
  public:

@@ -127,9 +127,11 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       const Eigen::MatrixXd design = independent_columns(columns);
       const NoiseModel record = record_of(input, i, free.coarse);
       const auto pool = [&](const Eigen::VectorXd& own_V2) {
-        return NoisePool(input.processes, record, own_V2)
-            .pool(mean_V - predicted[i], design,
-                  before.start != nullptr ? &(*before.start)[i].power : nullptr);
+        const NoisePool noise(input.processes, record, own_V2);
+        const Eigen::VectorXd residual_V = mean_V - predicted[i];
+        if (before.powers != nullptr) return noise.at((*before.powers)[i], residual_V, design);
+        return noise.pool(residual_V, design,
+                          before.start != nullptr ? &(*before.start)[i].power : nullptr);
       };
       const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2;
       stage.noise[i] = pool(own_V2);

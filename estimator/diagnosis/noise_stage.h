@@ -22,8 +22,9 @@ struct Stage {
 
 /// What is known before the noise of a model is estimated.
 struct Before {
-  PerAxis<const PooledNoise*> known{};          ///< pooled already; null where it has not been
-  const PerAxis<PooledNoise>* start = nullptr;  ///< powers to start from
+  PerAxis<const PooledNoise*> known{};               ///< pooled already; null where it has not been
+  const PerAxis<PooledNoise>* start = nullptr;       ///< powers to start from
+  const PerAxis<Eigen::VectorXd>* powers = nullptr;  ///< given: nothing is estimated
   /// Means of coarse axes freed of rounding by this stage are used as they are: likelihoods can be
   /// compared for the same readings only.
   const Stage* freed = nullptr;

@@ -70,7 +70,7 @@ std::vector<Scored> screen(const CandidateList& list, const CandidateGains& gain
     const double log_p = log_chi_squared_tail(gains(static_cast<Eigen::Index>(c)), gains_of.dof(c));
     const double score = log_p + std::log(static_cast<double>(list.family_size[family])) +
                          list.candidates[c].handicap;
-    if (score < best[family].score) best[family] = {c, log_p, score};
+    if (score < best[family].score) best[family] = {c, log_p, score, gains_of.dof(c)};
   }
   std::erase_if(best, [](const Scored& s) { return !std::isfinite(s.score); });
   std::sort(best.begin(), best.end(),

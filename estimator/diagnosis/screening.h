@@ -27,6 +27,7 @@ struct Scored {
   std::size_t candidate = 0;
   double log_p = 0;  ///< of its own test
   double score = 0;  ///< log_p plus the price of a large family and of having no name
+  int dof = 0;
 };
 
 /// Best hypothesis of each family by its first-order gain (one entry a candidate), best family

@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/slow_look.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -13,18 +14,108 @@
 namespace plumbline {
 namespace {
 
-/// Whether most of what a candidate does to its axis lies in the span of the slow functions.
-bool is_within(const SearchInput& input, const EnlargedParameters& model,
-               const Candidate& candidate, const Eigen::MatrixXd& basis) {
+bool is_within(Eigen::VectorXd change, const Eigen::MatrixXd& basis) {
   constexpr double kMost = 0.7;  // of the sum of squares
-  Eigen::VectorXd change =
-      predict_means_V(input.log, with_effect(model, candidate.active()))[candidate.axis] -
-      predict_means_V(input.log, model)[candidate.axis];
   change.array() -= change.mean();
   return (basis.transpose() * change).squaredNorm() > kMost * change.squaredNorm();
 }
+/// Whether most of what a candidate does lies in the span of the slow functions. `responses_V`:
+/// before they are whitened.
+bool is_within(const CandidateResponses& responses_V, std::size_t candidate,
+               const Eigen::MatrixXd& basis) {
+  const auto& [group, first, count] = responses_V.place[candidate];
+  return is_within(responses_V.groups[group].means.middleCols(first, count).rowwise().sum(), basis);
+}
+
+/// The open candidates of sensors that are slow, of the axes looked at. What shows within the dwell
+/// does not hide in slow noise.
+struct SlowCandidates {
+  CandidateList list;
+  std::vector<std::size_t> index;  ///< of each in the list that they are from
+  CandidateResponses responses_V;
+};
+SlowCandidates slow_candidates(const SearchInput& input, const CandidateList& list,
+                               const EnlargedParameters& model, const PerAxis<bool>& looked_at,
+                               const SlowLook& look) {
+  SlowCandidates slow;
+  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
+    const Candidate& candidate = list.candidates[c];
+    if (candidate.effect->subject() == Subject::head || candidate.effect->within_dwell() ||
+        !looked_at[candidate.axis] || !look.is_open(candidate))
+      continue;
+    slow.list.candidates.push_back(candidate);
+    slow.index.push_back(c);
+  }
+  slow.list.family_size = list.family_size;
+  slow.responses_V = candidate_responses_V(input.log, slow.list, model);
+  const Eigen::MatrixXd basis = orthonormal_basis(look.beside);
+  std::vector<std::size_t> within;
+  for (std::size_t c = 0; c < slow.index.size(); ++c)
+    if (is_within(slow.responses_V, c, basis)) within.push_back(c);
+  for (std::size_t k = 0; k < within.size(); ++k) {
+    slow.list.candidates[k] = slow.list.candidates[within[k]];
+    slow.index[k] = slow.index[within[k]];
+  }
+  slow.list.candidates.resize(within.size());
+  slow.index.resize(within.size());
+  slow.responses_V = some_of(slow.responses_V, within);
+  return slow;
+}
+
+/// The model's noise beside what is slow. The readings of a coarse axis are freed of rounding once
+/// more when its noise is known; the likelihood is that of those.
+Stage settle_beside(const SearchInput& input, const EnlargedParameters& model, const Stage& stage,
+                    const Eigen::MatrixXd& slow) {
+  Stage rich = settle_noise(input, model, {.known = {}, .start = &stage.noise}, slow);
+  if (rich.coarse == PerAxis<bool>{}) return rich;
+  Before before{.known = all_of(rich.noise), .start = &rich.noise, .freed = &rich};
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (rich.coarse[axis]) before.known[axis] = nullptr;
+  PerAxis<PooledNoise> noise = settle_noise(input, model, before, slow).noise;
+  rich.noise = std::move(noise);
+  return rich;
+}
+
+/// Best of each family by what it gains in −2 ln L to first order, each with the noise that suits
+/// it: between that beside the model, which has to take up whatever is slow, and that beside all
+/// that is slow, which has lost what was noise.
+std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCandidates& slow,
+                                          const EnlargedParameters& model,
+                                          const PerAxis<PooledNoise>& plain, const Stage& rich) {
+  constexpr std::array kTowardsRich = {0.0, 0.8, 0.96, 1.0};
+  CandidateResponses responses;
+  std::optional<CandidateGains> gains_of;
+  Eigen::VectorXd gains = Eigen::VectorXd::Zero(std::ssize(slow.index));
+  for (const double share : kTowardsRich) {
+    PerAxis<Eigen::VectorXd> powers;
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      powers[i] = plain[i].power + share * (rich.noise[i].power - plain[i].power);
+    const Stage stage = settle_noise(
+        input, model, {.known = {}, .start = nullptr, .powers = &powers, .freed = &rich});
+    const EnlargedFit fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
+    responses = whitened(slow.responses_V, input.log, stage.whitening);
+    gains_of.emplace(responses, fit);
+    const Eigen::VectorXd with_these = gains_of->of(fit.whitened_residual).col(0);
+    for (Eigen::Index c = 0; c < gains.size(); ++c) {
+      const std::size_t axis = slow.list.candidates[static_cast<std::size_t>(c)].axis;
+      gains(c) = std::max(gains(c), with_these(c) + plain[axis].likelihood_deviance -
+                                        stage.noise[axis].likelihood_deviance);
+    }
+  }
+  return screen(slow.list, *gains_of, gains);
+}
 
 }  // namespace
+
+bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::size_t effect,
+             const Eigen::MatrixXd& beside) {
+  EnlargedParameters without = model;
+  without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(effect));
+  const std::size_t axis = model.effects[effect].axis;
+  return is_within(
+      predict_means_V(input.log, model)[axis] - predict_means_V(input.log, without)[axis],
+      orthonormal_basis(beside));
+}
 
 bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis) {
   constexpr double kOfFast = 0.3;  // variances
@@ -41,10 +132,11 @@ bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t ax
 std::optional<SlowFinding> look_among_slow(const SearchInput& input, const CandidateList& list,
                                            const Stage& stage, bool noise_is_own,
                                            const SlowLook& look) {
-  constexpr std::size_t kRefined = 4;
+  constexpr std::size_t kRefined = 6;
+  constexpr double kHopeless = 0.9;  // to first order: its own noise and shapes gain it more
   const EnlargedParameters& model = stage.fit.parameters;
-  const Stage rich = settle_noise(input, model, {{}, &stage.noise, nullptr}, look.beside);
-  Before before{{}, &stage.noise, &rich};
+  const Stage rich = settle_beside(input, model, stage, look.beside);
+  Before before{.known = {}, .start = &stage.noise, .freed = &rich};
   // The noise that was handed in may have been estimated beside more than the model.
   for (std::size_t axis = 0; noise_is_own && axis < kAxisCount; ++axis)
     if (!rich.coarse[axis]) before.known[axis] = &stage.noise[axis];
@@ -56,21 +148,20 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
     looked_at[i] = looked_at[i] && (look.worth_a_look >= 1 || p < look.worth_a_look);
   }
   if (looked_at == PerAxis<bool>{}) return {};
-  const EnlargedFit rich_fit = fit_enlarged(input.log, rich.observed, rich.whitening, model);
-  const CandidateResponses beside_slow =
-      candidate_responses(input.log, list, rich.whitening, rich_fit.parameters);
-  const CandidateGains gains(beside_slow, rich_fit);
-  std::vector<Scored> ranked = screen(list, gains, gains.of(rich_fit.whitened_residual).col(0));
-  const Eigen::MatrixXd slow = orthonormal_basis(look.beside);
-  std::erase_if(ranked, [&](const Scored& s) {
-    const Candidate& c = list.candidates[s.candidate];
-    return c.effect->subject() == Subject::head || !looked_at[c.axis] || !look.is_open(c) ||
-           !is_within(input, model, c, slow);
-  });
+  const SlowCandidates slow = slow_candidates(input, list, model, looked_at, look);
+  std::vector<Scored> ranked = screen_with_own_noise(input, slow, model, plain, rich);
+  for (Scored& s : ranked) s.candidate = slow.index[s.candidate];
+  const std::size_t families = ranked.size();
+  const auto p_of_look = [&](double log_p, std::size_t candidate) {
+    const std::size_t family = list.candidates[candidate].family;
+    return p_of_search(log_p, static_cast<double>(families * list.family_size[family]));
+  };
+  std::erase_if(ranked,
+                [&](const Scored& s) { return p_of_look(s.log_p, s.candidate) > kHopeless; });
   std::vector<Stage> stages(std::min(kRefined, ranked.size()));
   parallel_for(stages.size(), [&](std::size_t k) {
     const Candidate& candidate = list.candidates[ranked[k].candidate];
-    Before compared{all_of(plain), &rich.noise, &rich};
+    Before compared{.known = all_of(plain), .start = &rich.noise, .freed = &rich};
     compared.known[candidate.axis] = nullptr;
     // So little is known of a slow effect that a time constant would run away before the amplitude
     // is known, and sometimes after.
@@ -90,10 +181,9 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
     if (!with.fit.determined) continue;
     const double gain =
         plain[candidate.axis].likelihood_deviance - with.noise[candidate.axis].likelihood_deviance;
-    const double log_p = log_chi_squared_tail(gain, gains.dof(ranked[k].candidate));
+    const double log_p = log_chi_squared_tail(gain, ranked[k].dof);
     // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
-    const double p_value =
-        p_of_search(log_p, static_cast<double>(ranked.size() * list.family_size[candidate.family]));
+    const double p_value = p_of_look(log_p, ranked[k].candidate);
     const std::pair score{p_value > look.false_alarm, log_p + (ranked[k].score - ranked[k].log_p)};
     if (score >= best_score) continue;
     best_score = score;

@@ -35,6 +35,11 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
                                            const Stage& stage, bool noise_is_own,
                                            const SlowLook& look);
 
+/// Whether most of what one of the model's effects on a sensor does could be slow noise: lies in
+/// the span of `beside`.
+bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::size_t effect,
+             const Eigen::MatrixXd& beside);
+
 /// Whether there is slow noise in which an effect could hide.
 bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis);
 

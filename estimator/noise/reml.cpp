@@ -433,6 +433,12 @@ PooledNoise NoisePool::climb(const Eigen::VectorXd& first, const std::vector<boo
   return result;
 }
 
+PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
+                          const Eigen::MatrixXd& design) const {
+  const Point point = evaluate(power, mean, design);
+  return {power, covariance(power), point.deviance, point.likelihood_deviance, true};
+}
+
 NoiseModel without_record(NoiseModel model) {
   model.descriptions.clear();
   model.Q.value = model.N.value = model.B.value = model.K.value = 0;

@@ -55,6 +55,9 @@ class NoisePool {
   /// mean: n; design: n×p of full rank, n > p. `start`: powers to begin with, or null.
   PooledNoise pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                    const Eigen::VectorXd* start = nullptr) const;
+  /// The same where the powers are given.
+  PooledNoise at(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
+                 const Eigen::MatrixXd& design) const;
   /// What is known of the powers that pool() found for this mean and design; P is the projector of
   /// their Σ and of the design. The likelihood is taken to second order about them, and
   /// covariance_of_powers() of that.

@@ -204,6 +204,37 @@ TEST(DiagnosisStudy, APumpInStrongSlowNoiseIsFoundByItsRegularity) {
   EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
 }
 
+// On the other axes all that is slow gains more, as long as nothing is noise; with noise of its own
+// only the truth does.
+TEST(DiagnosisStudy, APlayInStrongSlowNoiseIsFoundBesideAxesWithMoreNoise) {
+  const SetOutcome outcome = run_set({.seed = 760005,
+                                      .effects = {"own.thermal_hysteresis"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 12,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
+}
+
+// A drift looks better as long as the noise is the one that had to take up the creep.
+TEST(DiagnosisStudy, CreepInSlowNoiseIsNotTakenForADrift) {
+  const SetOutcome outcome = run_set({.seed = 760002,
+                                      .effects = {"own.creep"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::examples,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 600});
+  EXPECT_EQ(outcome.driver_right, 1) << outcome.found;
+  EXPECT_EQ(outcome.listed_instead, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
+}
+
 // The covariance that the oracle uses is the one that the simulated noise has.
 TEST(DiagnosisStudy, TrueCovariancePredictsTheResidualOfPlainSets) {
   for (const NoiseKind kind : {NoiseKind::white, NoiseKind::examples, NoiseKind::coloured}) {

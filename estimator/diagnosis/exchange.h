@@ -1,0 +1,19 @@
+// What was chosen first was chosen while the others were still missing, and with noise that had to
+// take up what was not in the model: it may have to give way.
+#pragma once
+
+#include <cstddef>
+
+#include "estimator/diagnosis/search_model.h"
+
+namespace plumbline {
+
+/// Replaces one of the model's effects, or two, by a single one that explains as much for less.
+/// Whether there was one.
+bool exchange_one(SearchModel& model);
+
+/// The same for effect k where it is slow and there is slow noise: the rivals are compared each
+/// with the noise that suits it.
+bool exchange_slow(SearchModel& model, std::size_t k);
+
+}  // namespace plumbline

@@ -1,0 +1,137 @@
+#include "estimator/diagnosis/repetition.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+#include "estimator/diagnosis/edge_comb.h"
+#include "estimator/diagnosis/screening.h"
+
+namespace plumbline {
+
+namespace {
+
+/// Those that gain most beside a fit to first order, best first.
+std::vector<Candidate> likeliest(const SearchModel& model, const CandidateList& list,
+                                 const EnlargedFit& fit) {
+  constexpr std::size_t kFew = 8;
+  if (list.candidates.size() <= kFew) return list.candidates;
+  const CandidateResponses beside =
+      candidate_responses(model.input().log, list, model.stage().whitening, fit.parameters);
+  const Eigen::VectorXd gains = CandidateGains(beside, fit).of(fit.whitened_residual);
+  std::vector<std::size_t> order(list.candidates.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) {
+    return gains(static_cast<Eigen::Index>(k)) > gains(static_cast<Eigen::Index>(l));
+  });
+  std::vector<Candidate> few;
+  for (std::size_t k = 0; k < kFew; ++k) few.push_back(list.candidates[order[k]]);
+  return few;
+}
+
+/// One candidate in the place of the `instances` of the candidate `repeated`, whose parameters
+/// are `p`; of all that could be one, so many were looked at.
+bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instances,
+                    const Candidate& repeated, const std::vector<std::vector<double>>& p,
+                    double looks) {
+  const EnlargedFit without = model.fit_without(instances);
+  if (!without.determined) return false;
+  const Effect* tried = nullptr;
+  std::optional<SearchModel::Entry> best;
+  double best_cost = model.stage().fit.chi2 + model.price_of(instances);
+  for (std::size_t c = 0; c < model.list().candidates.size(); ++c) {
+    const Candidate& candidate = model.list().candidates[c];
+    if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
+    tried = candidate.effect;
+    CandidateList ones;
+    for (const Hypothesis& hypothesis : tried->in_one(repeated.effect->id(), p))
+      ones.candidates.push_back(
+          {.effect = tried, .axis = candidate.axis, .hypothesis = hypothesis});
+    for (const Candidate& one : likeliest(model, ones, without)) {
+      const ActiveEffect active = one.active();
+      const EnlargedFit with = model.fit_with(without.parameters, active);
+      const auto dof = static_cast<int>(std::count(active.free.begin(), active.free.end(), true));
+      const double cost = with.chi2 + model.price(c, dof);
+      if (!with.determined || cost >= best_cost) continue;
+      const double p_value = p_of_search(
+          log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks);
+      if (p_value > model.options().false_alarm) continue;
+      best_cost = cost;
+      best = {c, p_value, with.parameters};
+    }
+  }
+  return best && model.exchange(instances, *best);
+}
+
+bool is_step(const Candidate& candidate) { return candidate.effect->id() == "sensor.bias_step"; }
+/// What the model holds of an axis that steps: steps one by one, and trains of them.
+std::vector<std::size_t> of_regular_steps(const SearchModel& model, std::size_t axis) {
+  const std::vector<std::vector<double>> any_train = {{1, 0}, {1, 1}, {-1, 0.5}};
+  std::vector<std::size_t> found;
+  for (std::size_t k = 0; k < model.size(); ++k) {
+    const Candidate& chosen = model.candidate(k);
+    if (chosen.axis == axis &&
+        (is_step(chosen) || !chosen.effect->in_one("sensor.bias_step", any_train).empty()))
+      found.push_back(k);
+  }
+  return found;
+}
+bool put_train_in_place_of(SearchModel& model, const std::vector<std::size_t>& instances,
+                           std::size_t axis) {
+  constexpr double kRefined = 1.3;  // by which a train may gain more when its edges move
+  const EnlargedFit without = model.fit_without(instances);
+  if (!without.determined) return false;
+  const auto comb = regular_steps(model.list(), model.responses(), without, axis);
+  if (!comb) return false;
+  const double looks = static_cast<double>(kAxisCount) * comb->looks;
+  if (p_of_search(log_chi_squared_tail(kRefined * comb->gain, 1), looks) >
+      model.options().false_alarm)
+    return false;
+  const double size = comb->size, up_s = comb->first_up_s;
+  return replace_in_one(
+      model, instances, model.list().candidates[comb->first_step],
+      {{size, up_s}, {size, up_s + comb->period_s}, {-size, up_s + comb->width_s}}, looks);
+}
+
+}  // namespace
+
+void tell_in_one(SearchModel& model) {
+  for (std::size_t k = 0; k < model.size(); ++k) {
+    const Candidate& first = model.candidate(k);
+    if (is_step(first)) {
+      const std::vector<std::size_t> steps = of_regular_steps(model, first.axis);
+      const auto first_step = std::find_if(
+          steps.begin(), steps.end(), [&](std::size_t l) { return is_step(model.candidate(l)); });
+      if (k == *first_step && steps.size() > 1 && put_train_in_place_of(model, steps, first.axis))
+        return;
+      continue;
+    }
+    std::vector<std::size_t> instances;
+    std::vector<std::vector<double>> p;
+    for (std::size_t l = k; l < model.size(); ++l) {
+      const Candidate& other = model.candidate(l);
+      if (other.effect != first.effect || other.axis != first.axis) continue;
+      instances.push_back(l);
+      p.push_back(model.stage().fit.parameters.effects[l].p);
+    }
+    if (instances.size() > 1 && replace_in_one(model, instances, first, p, model.looks())) return;
+  }
+}
+
+bool add_train(SearchModel& model) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const std::vector<std::size_t> found = of_regular_steps(model, axis);
+    if (put_train_in_place_of(model, found, axis)) return true;
+    // What stepped by itself may stay beside it, another train not.
+    if (!found.empty() &&
+        std::all_of(found.begin(), found.end(),
+                    [&](std::size_t k) { return is_step(model.candidate(k)); }) &&
+        put_train_in_place_of(model, {}, axis))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace plumbline

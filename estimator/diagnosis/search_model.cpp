@@ -1,0 +1,234 @@
+#include "estimator/diagnosis/search_model.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "estimator/diagnosis/residual_test.h"
+#include "estimator/diagnosis/screening.h"
+#include "estimator/noise/chi_squared.h"
+#include "estimator/parallel_for.h"
+
+namespace plumbline {
+
+namespace {
+
+/// Whether two models have the same effects on an axis, whatever their sizes.
+bool same_on_axis(const EnlargedParameters& a, const EnlargedParameters& b, std::size_t axis) {
+  const auto effects_on = [axis](const EnlargedParameters& model) {
+    std::vector<const ActiveEffect*> found;
+    for (const ActiveEffect& active : model.effects)
+      if (active.effect->subject() == Subject::head || active.axis == axis)
+        found.push_back(&active);
+    return found;
+  };
+  const auto of_a = effects_on(a), of_b = effects_on(b);
+  return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+                    [](const ActiveEffect* x, const ActiveEffect* y) {
+                      if (x->effect != y->effect || x->free != y->free) return false;
+                      for (std::size_t k = 0; k < x->p.size(); ++k)
+                        if (!x->free[k] && x->p[k] != y->p[k]) return false;
+                      return true;
+                    });
+}
+
+}  // namespace
+
+SearchModel::SearchModel(const SearchInput& input, const CandidateList& list,
+                         const SearchOptions& options)
+    : input_(input), list_(list), options_(options) {
+  Before before;
+  if (input.pooled != nullptr) before.known = all_of(*input.pooled);
+  stage_ = settle(input, input.start, before);
+  noise_is_own_ = input.pooled == nullptr;
+}
+
+bool SearchModel::is_dropped(const Candidate& candidate) const {
+  return std::count(dropped_.begin(), dropped_.end(), candidate.family) > 0;
+}
+
+double SearchModel::p_of(double log_p_local) const { return p_of_search(log_p_local, looks_); }
+
+double SearchModel::price(std::size_t candidate, int dof) const {
+  const Candidate& c = list_.candidates[candidate];
+  constexpr double kPerParameter = 7;  // about 2·ln of the number of poses
+  return 2 * (std::log(static_cast<double>(list_.family_size[c.family])) + c.handicap) +
+         kPerParameter * dof;
+}
+
+double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
+  double sum = 0;
+  for (const std::size_t k : effects) sum += price(chosen_[k], std::max(1, dof_of(k)));
+  return sum;
+}
+
+double SearchModel::log_p_of(std::size_t candidate, double gain, int dof,
+                             const EnlargedFit& with) const {
+  if (!list_.candidates[candidate].of_one_coarse_reading) return log_chi_squared_tail(gain, dof);
+  const auto before = predict_means_V(input_.log, stage_.fit.parameters);
+  const auto after = predict_means_V(input_.log, with.parameters);
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if ((after[i] - before[i]).lpNorm<Eigen::Infinity>() > input_.log.step_V(i))
+      return log_chi_squared_tail(gain, dof);
+  return std::log(std::max(f_tail(gain / dof, dof, kDofOfCoarseReadings), 1e-300));
+}
+
+EnlargedFit SearchModel::fit(const EnlargedParameters& parameters) const {
+  return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
+}
+
+EnlargedFit SearchModel::fit_with(const EnlargedParameters& model,
+                                  const ActiveEffect& active) const {
+  return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening,
+                            with_effect(model, active), model.effects.size());
+}
+
+EnlargedParameters SearchModel::linear_start(std::size_t candidate) const {
+  const auto& [g, first, count] = responses_->place[candidate];
+  const CandidateResponses::Group& group = responses_->groups[g];
+  const Eigen::MatrixXd& model = stage_.fit.whitened_jacobian;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(model.rows(), model.cols() + count);
+  columns.leftCols(model.cols()) = model;
+  columns.block(group.first_row, model.cols(), group.means.rows(), count) =
+      group.means.middleCols(first, count);
+  columns.block(group.first_dwell_row, model.cols(), group.dwells.rows(), count) =
+      group.dwells.middleCols(first, count);
+  const Eigen::VectorXd norms = columns.colwise().norm().cwiseMax(1e-300);
+  const Eigen::VectorXd step =
+      norms.cwiseInverse().cwiseProduct((columns * norms.cwiseInverse().asDiagonal())
+                                            .colPivHouseholderQr()
+                                            .solve(stage_.fit.whitened_residual));
+  EnlargedParameters start = stage_.fit.parameters;
+  start.set_free_values(start.free_values() + step.head(model.cols()));
+  ActiveEffect active = list_.candidates[candidate].active();
+  const auto infos = active.effect->parameters();
+  Eigen::Index column = model.cols();
+  for (std::size_t k = 0; k < infos.size(); ++k)
+    if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0)
+      active.p[k] *= step(column++);
+  return with_effect(std::move(start), active);
+}
+
+EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) const {
+  EnlargedParameters fewer = stage_.fit.parameters;
+  for (auto k = effects.rbegin(); k != effects.rend(); ++k)
+    fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(*k));
+  return fit(fewer);
+}
+
+bool SearchModel::adopt(const EnlargedParameters& parameters) {
+  Before before{.known = {}, .start = &stage_.noise};
+  for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
+    if (same_on_axis(parameters, stage_.fit.parameters, axis))
+      before.known[axis] = &stage_.noise[axis];
+  Stage next = settle(input_, parameters, before);
+  if (!next.fit.determined) return false;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (before.known[axis] != nullptr) next.crossing_V2[axis] = std::move(stage_.crossing_V2[axis]);
+  stage_ = std::move(next);
+  noise_is_own_ = true;
+  responses_.reset();
+  return true;
+}
+
+const CandidateResponses& SearchModel::responses() {
+  if (!responses_)
+    responses_ = candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
+  return *responses_;
+}
+
+bool SearchModel::is_certain(const Candidate& candidate) const {
+  return candidate.effect->certain(input_.log);
+}
+
+bool SearchModel::is_chosen(const Candidate& candidate) const {
+  if (is_certain(candidate)) return true;  // in the model from the start
+  return !candidate.effect->repeats() &&
+         std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
+           return list_.candidates[k].effect == candidate.effect &&
+                  list_.candidates[k].axis == candidate.axis;
+         });
+}
+
+void SearchModel::forget(std::size_t effect) {
+  chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(effect));
+  p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(effect));
+}
+/// Puts one of those close to the newcomer in its place that explains clearly more.
+void SearchModel::look_closer() {
+  constexpr double kClearly = 10;
+  const ActiveEffect& newcomer = stage_.fit.parameters.effects.back();
+  const std::vector<Hypothesis> closer =
+      newcomer.effect->closer(input_.log, newcomer.axis, {newcomer.p});
+  std::vector<EnlargedFit> fits(closer.size());
+  parallel_for(fits.size(), [&](std::size_t k) {
+    EnlargedParameters model = stage_.fit.parameters;
+    model.effects.back().p = closer[k].p;
+    fits[k] = fit(model);
+  });
+  const EnlargedFit* best = nullptr;
+  for (const EnlargedFit& with : fits)
+    if (with.determined && with.chi2 < stage_.fit.chi2 - kClearly &&
+        (best == nullptr || with.chi2 < best->chi2))
+      best = &with;
+  if (best != nullptr) adopt(best->parameters);
+}
+
+bool SearchModel::add(const Entry& with) { return exchange({}, with); }
+
+bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry& with) {
+  if (!adopt(with.parameters)) return false;
+  for (auto k = effects.rbegin(); k != effects.rend(); ++k) forget(*k);
+  chosen_.push_back(with.candidate);
+  p_values_.push_back(with.p);
+  look_closer();
+  return true;
+}
+
+double SearchModel::p_of_removal(const EnlargedFit& without) const {
+  const auto free =
+      static_cast<double>(stage_.fit.parameters.free_count() - without.parameters.free_count());
+  return p_of(log_chi_squared_tail(without.chi2 - stage_.fit.chi2, std::max(1.0, free)));
+}
+
+void SearchModel::drop_superfluous() {
+  for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
+    if (is_certain(candidate(k))) continue;
+    const EnlargedFit without = fit_without({k});
+    if (!without.determined || p_of_removal(without) < options_.false_alarm) continue;
+    if (!adopt(without.parameters)) continue;
+    dropped_.push_back(candidate(k).family);
+    forget(k);
+  }
+}
+
+int SearchModel::dof_of(std::size_t effect) const {
+  const auto& free = stage_.fit.parameters.effects[effect].free;
+  return static_cast<int>(std::count(free.begin(), free.end(), true));
+}
+
+SearchResult SearchModel::take_result() {
+  SearchResult result;
+  result.evidence.resize(chosen_.size());
+  parallel_for(chosen_.size(), [&](std::size_t k) {
+    const std::vector<bool>& free = stage_.fit.parameters.effects[k].free;
+    const auto dof = std::max<std::ptrdiff_t>(1, std::count(free.begin(), free.end(), true));
+    const double lost = fit_without({k}).chi2 - stage_.fit.chi2;
+    result.evidence[k] = {candidate(k), p_values_[k],
+                          sigmas_of(log_chi_squared_tail(lost, static_cast<double>(dof)))};
+  });
+  responses();
+  result.responses = std::move(*responses_);
+  result.fit = std::move(stage_.fit);
+  result.observed = std::move(stage_.observed);
+  result.own_V2 = std::move(stage_.own_V2);
+  result.coarse = stage_.coarse;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (stage_.crossing_V2[axis].size() > 0) result.own_V2[axis] += stage_.crossing_V2[axis];
+  result.noise = std::move(stage_.noise);
+  result.whitening = std::move(stage_.whitening);
+  return result;
+}
+
+}  // namespace plumbline

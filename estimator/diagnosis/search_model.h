@@ -1,0 +1,97 @@
+// The model that a search has arrived at, with its noise and what each of its effects cost to find.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "estimator/diagnosis/noise_stage.h"
+#include "estimator/diagnosis/search.h"
+
+namespace plumbline {
+
+class SearchModel {
+ public:
+  /// Begins with input.start. All three must live as long.
+  SearchModel(const SearchInput& input, const CandidateList& list, const SearchOptions& options);
+
+  const SearchInput& input() const { return input_; }
+  const CandidateList& list() const { return list_; }
+  const SearchOptions& options() const { return options_; }
+  const Stage& stage() const { return stage_; }
+  /// Whether the noise of the stage was estimated beside its model and nothing else.
+  bool noise_is_own() const { return noise_is_own_; }
+
+  /// Effects in the model, and which of the candidates each of them is.
+  std::size_t size() const { return chosen_.size(); }
+  std::size_t index(std::size_t effect) const { return chosen_[effect]; }
+  const Candidate& candidate(std::size_t effect) const { return list_.candidates[index(effect)]; }
+  /// Whether the codes prove it.
+  bool is_certain(const Candidate& candidate) const;
+  /// An effect stands in the model once; a second pose, slip or step is another matter.
+  bool is_chosen(const Candidate& candidate) const;
+  /// What proved superfluous once would come back and go again.
+  bool is_dropped(const Candidate& candidate) const;
+
+  /// How many independent looks the search amounts to; a p-value of the search as a whole.
+  double looks() const { return looks_; }
+  void set_looks(double looks) { looks_ = looks; }
+  double p_of(double log_p_local) const;
+  /// log of the probability that noise alone gives a candidate this gain. A single reading of a
+  /// coarse converter strays further than Gaussian noise, but by no more than a step.
+  double log_p_of(std::size_t candidate, double gain, int dof, const EnlargedFit& with) const;
+  /// What a candidate must gain in χ² to be worth its freedom, its choice among many and its want
+  /// of a name.
+  double price(std::size_t candidate, int dof) const;
+  /// What some of the model's effects had to gain together.
+  double price_of(const std::vector<std::size_t>& effects) const;
+
+  /// The candidates beside the model as it stands.
+  const CandidateResponses& responses();
+
+  /// Fits with the noise as it stands: of any model, of one with one more effect, of this one
+  /// without some of its effects (ascending).
+  EnlargedFit fit(const EnlargedParameters& parameters) const;
+  EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const;
+  EnlargedFit fit_without(const std::vector<std::size_t>& effects) const;
+  /// The model with one more effect where the linear problem puts both. What follows the readings
+  /// finely may not be reached from parameters that were estimated without it. Precondition:
+  /// responses() is up to date.
+  EnlargedParameters linear_start(std::size_t candidate) const;
+
+  /// A candidate that may come into the model, and the model with it.
+  struct Entry {
+    std::size_t candidate = 0;
+    double p = 1;  ///< of the search
+    EnlargedParameters parameters;
+  };
+  /// Each takes over another model with noise of its own, if its parameters are determined, and
+  /// says whether it did: with one more effect; with one in the place of some (ascending).
+  bool add(const Entry& with);
+  bool exchange(const std::vector<std::size_t>& effects, const Entry& with);
+  /// What a newcomer has made superfluous goes.
+  void drop_superfluous();
+
+  /// All but p_best_rest. Leaves nothing here.
+  SearchResult take_result();
+
+ private:
+  bool adopt(const EnlargedParameters& parameters);
+  void look_closer();
+  void forget(std::size_t effect);
+  int dof_of(std::size_t effect) const;
+  double p_of_removal(const EnlargedFit& without) const;
+
+  const SearchInput& input_;
+  const CandidateList& list_;
+  const SearchOptions& options_;
+  Stage stage_;
+  bool noise_is_own_ = false;
+  std::optional<CandidateResponses> responses_;
+  std::vector<std::size_t> chosen_;  ///< candidates, in the order of the model's effects
+  std::vector<double> p_values_;
+  std::vector<std::size_t> dropped_;  ///< families
+  double looks_ = 0;
+};
+
+}  // namespace plumbline
