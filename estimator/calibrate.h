@@ -234,6 +234,7 @@ struct Evaluation {
   std::size_t samples = 0;
   EvaluationFigures before;  ///< the 12 parameters alone
   EvaluationFigures after;   ///< the certified model
+  BetweenSets head = BetweenSets::anywhere;  ///< between the calibration run and this set
   /// What of it is not applied: it belonged to the run, or needs a column that the set lacks.
   std::vector<std::string> left_out;
 };
@@ -251,8 +252,9 @@ CertifiedModel certified_model(const Calibration& calibration,
                                const std::vector<std::shared_ptr<const Effect>>& own_effects = {});
 
 /// Where its times say that the set followed the calibration run, effects that remember what came
-/// before go on from there; `head`: how it came to the first pose of the set.
+/// before go on from there. `head`: how it came to the first pose of the set; where that is not
+/// known, the way that leaves less.
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
-                    const RunDescription& description, BetweenSets head = BetweenSets::anywhere);
+                    const RunDescription& description, std::optional<BetweenSets> head = {});
 
 }  // namespace plumbline

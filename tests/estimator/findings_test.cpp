@@ -8,6 +8,8 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <tuple>
+#include <vector>
 
 #include "estimator/calibrate.h"
 #include "estimator/kinematics.h"
@@ -156,6 +158,60 @@ TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
   EXPECT_EQ(result.diagnosis.effects.front().parameters.size(), 4U);
   const Evaluation evaluation = evaluate(certified_model(result), data.run, data.description);
   EXPECT_LT(evaluation.after.pose_rms_mps2[0], 1.3 * result.floor_pose_rms_mps2[0]);
+}
+
+/// Poses `first` … `last` − 1 of a set.
+MeasurementSet poses_of(const MeasurementSet& set, std::size_t first, std::size_t last) {
+  MeasurementSet part;
+  for (std::size_t k = first; k < last; ++k) {
+    Pose pose = set.poses[k];
+    const auto from = static_cast<std::ptrdiff_t>(pose.first);
+    const auto to = from + static_cast<std::ptrdiff_t>(pose.count);
+    pose.first = part.samples.size();
+    part.poses.push_back(pose);
+    const auto append = [&](std::vector<double>& to_column, const std::vector<double>& column) {
+      to_column.insert(to_column.end(), column.begin() + from, column.begin() + to);
+    };
+    append(part.samples.t_s, set.samples.t_s);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      append(part.samples.u_V[axis], set.samples.u_V[axis]);
+  }
+  return part;
+}
+
+// Where settling begins from, the readings tell: from the last pose of the calibration run, or from
+// somewhere that nothing recorded.
+TEST(Evaluate, TellsFromTheReadingsWhetherTheHeadWentElsewhere) {
+  SyntheticOptions options;
+  options.delta_step_deg = 20;
+  options.more_x_V = [before_g = 0.0, now_g = 0.0, arrival_s = 0.0](double a_g,
+                                                                    double t_s) mutable {
+    if (a_g != now_g) {
+      before_g = now_g;
+      now_g = a_g;
+      arrival_s = t_s;
+    }
+    return 4e-3 * (before_g - now_g) * std::exp(-(t_s - arrival_s) / 0.2);
+  };
+  SyntheticRun data = synthetic_run(9, kSixteenBits, options);
+  const MeasurementSet whole = data.run;
+  data.run = poses_of(whole, 0, 70);
+  const CertifiedModel model = certified_model(calibrated(data));
+  ASSERT_THAT(model.effects, Contains(Field(&FoundEffect::id, "sensor.settling")));
+
+  const MeasurementSet next = poses_of(whole, 70, 90);
+  const Evaluation stayed = evaluate(model, next, data.description);
+  EXPECT_EQ(stayed.head, BetweenSets::nowhere);
+  const MeasurementSet later = poses_of(whole, 81, 90);
+  const Evaluation moved = evaluate(model, later, data.description);
+  EXPECT_EQ(moved.head, BetweenSets::anywhere);
+  // Told what is not so, the first pose is wrong.
+  for (const auto& [told, readings, truth] : {std::tuple(BetweenSets::anywhere, &next, &stayed),
+                                              std::tuple(BetweenSets::nowhere, &later, &moved)}) {
+    const Evaluation wrong = evaluate(model, *readings, data.description, told);
+    EXPECT_EQ(wrong.head, told);
+    EXPECT_GT(wrong.after.pose_max_abs_mps2[0], 1.5 * truth->after.pose_max_abs_mps2[0]);
+  }
 }
 
 TEST(Evaluate, SaysWhatItCannotApply) {
