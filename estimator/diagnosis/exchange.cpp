@@ -95,12 +95,9 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
   const auto is_open = [&](const Candidate& c) {
     return c.effect == chosen.effect || !model.is_chosen(c);
   };
-  const auto found =
-      look_among_slow(model.input(), model.list(), stage, true,
-                      {beside, axes, 1, model.options().false_alarm_of_slow, is_open});
-  if (!found || found->p_value > model.options().false_alarm_of_slow ||
-      found->candidate == model.index(k))
-    return false;
+  const auto found = look_among_slow(model.input(), model.list(), stage, true,
+                                     {beside, axes, 1, model.false_alarm_of_slow(), is_open});
+  if (!found || !found->significant || found->candidate == model.index(k)) return false;
   const auto cost = [&](const EnlargedParameters& with, const ActiveEffect& active,
                         std::size_t candidate) {
     Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};

@@ -149,11 +149,10 @@ class Search {
     };
     const auto found =
         look_among_slow(input_, list_, model_.stage(), model_.noise_is_own(),
-                        {beside, axes, worth_a_look, options_.false_alarm_of_slow, is_open});
+                        {beside, axes, worth_a_look, model_.false_alarm_of_slow(), is_open});
     if (!found) return false;
     p_best_rest_ = std::min(p_best_rest_, found->p_value);
-    return found->p_value <= options_.false_alarm_of_slow &&
-           model_.add({found->candidate, found->p_value, found->model});
+    return found->significant && model_.add({found->candidate, found->p_value, found->model});
   }
 
   /// A term that holds one of the model's effects as a special case cannot stand beside it: it

@@ -17,9 +17,10 @@ struct SearchOptions {
   /// because the noise itself is only estimated: slow drifts come out too significant.
   double false_alarm = 1e-4;
   /// The same for a slow effect that is compared with the noise estimated anew under each
-  /// hypothesis. Smaller, because little is known of slow noise: of 400 simulated units without any
-  /// effect three came out below 3e-4.
-  double false_alarm_of_slow = 1e-5;
+  /// hypothesis; on an axis whose converter is coarse, where what is left of rounding follows the
+  /// positions and is slow when they are, less.
+  double false_alarm_of_slow = 3e-4;
+  double false_alarm_of_slow_when_coarse = 1e-5;
   int replicates = 150;  ///< of simulated noise, for the look-elsewhere correction
   std::size_t max_effects = 6;
 };

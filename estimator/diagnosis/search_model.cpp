@@ -50,6 +50,14 @@ bool SearchModel::is_dropped(const Candidate& candidate) const {
 
 double SearchModel::p_of(double log_p_local) const { return p_of_search(log_p_local, looks_); }
 
+PerAxis<double> SearchModel::false_alarm_of_slow() const {
+  PerAxis<double> share;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    share[axis] = stage_.coarse[axis] ? options_.false_alarm_of_slow_when_coarse
+                                      : options_.false_alarm_of_slow;
+  return share;
+}
+
 double SearchModel::price(std::size_t candidate, int dof) const {
   const Candidate& c = list_.candidates[candidate];
   constexpr double kPerParameter = 7;  // about 2·ln of the number of poses

@@ -37,6 +37,8 @@ class SearchModel {
   double looks() const { return looks_; }
   void set_looks(double looks) { looks_ = looks; }
   double p_of(double log_p_local) const;
+  /// What counts as significant among the slow candidates of each axis.
+  PerAxis<double> false_alarm_of_slow() const;
   /// log of the probability that noise alone gives a candidate this gain. A single reading of a
   /// coarse converter strays further than Gaussian noise, but by no more than a step.
   double log_p_of(std::size_t candidate, double gain, int dof, const EnlargedFit& with) const;

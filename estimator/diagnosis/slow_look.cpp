@@ -184,10 +184,11 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
     const double log_p = log_chi_squared_tail(gain, ranked[k].dof);
     // Few candidates are slow, so few looks were taken; and the noise is no longer at fault.
     const double p_value = p_of_look(log_p, ranked[k].candidate);
-    const std::pair score{p_value > look.false_alarm, log_p + (ranked[k].score - ranked[k].log_p)};
+    const bool significant = p_value <= look.false_alarm[candidate.axis];
+    const std::pair score{!significant, log_p + (ranked[k].score - ranked[k].log_p)};
     if (score >= best_score) continue;
     best_score = score;
-    best = {ranked[k].candidate, std::move(with.fit.parameters), p_value};
+    best = {ranked[k].candidate, std::move(with.fit.parameters), p_value, significant};
   }
   return best;
 }

@@ -16,7 +16,8 @@ struct SlowLook {
   PerAxis<bool> axes;
   /// An axis is looked at when all of `beside` together has a smaller p-value; 1: always.
   double worth_a_look;
-  double false_alarm;  ///< p-value of the look below which a candidate counts as significant
+  /// p-value of the look below which a candidate counts as significant, per axis.
+  PerAxis<double> false_alarm;
   std::function<bool(const Candidate&)> is_open;  ///< whether a candidate may join the model
 };
 
@@ -25,6 +26,7 @@ struct SlowFinding {
   std::size_t candidate = 0;
   EnlargedParameters model;  ///< with it, fitted
   double p_value = 1;        ///< of the look as a whole
+  bool significant = false;
 };
 
 /// The noise is estimated once more, beside all that is slow, and the candidates are compared by
