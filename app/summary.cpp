@@ -174,7 +174,8 @@ std::string evaluation_summary(const Evaluation& evaluation, const std::optional
   text += ".\n";
   if (!evaluation.left_out.empty()) {
     text += fmt::format(
-        "Not applied, as it belonged to the calibration run or this set lacks a column: {}.\n",
+        "Not applied, as it belonged to the calibration run, this set lacks a column, or another "
+        "version found it: {}.\n",
         fmt::join(evaluation.left_out, ", "));
   }
   return text;

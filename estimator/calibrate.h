@@ -235,7 +235,8 @@ struct Evaluation {
   EvaluationFigures before;  ///< the 12 parameters alone
   EvaluationFigures after;   ///< the certified model
   BetweenSets head = BetweenSets::anywhere;  ///< between the calibration run and this set
-  /// What of it is not applied: it belonged to the run, or needs a column that the set lacks.
+  /// What of it is not applied: it belonged to the run, needs a column that the set lacks, or is a
+  /// term that this version does not have.
   std::vector<std::string> left_out;
 };
 
