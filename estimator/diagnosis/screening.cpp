@@ -16,7 +16,7 @@ double log_chi_squared_tail(double x, double dof) {
   if (x < 200) return std::log(std::max(chi_squared_tail(x, dof), 1e-300));
   // Leading terms of the incomplete gamma function for large x.
   const double half = 0.5 * dof, y = 0.5 * x;
-  return (half - 1) * std::log(y) - y - std::lgamma(half) + std::log1p((half - 1) / y);
+  return (half - 1) * std::log(y) - y - log_gamma(half) + std::log1p((half - 1) / y);
 }
 
 double sigmas_of(double log_p) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "estimator/noise/chi_squared.h"
+
 namespace plumbline {
 
 namespace {
@@ -60,7 +62,7 @@ namespace {
 
 /// log of the number of ways to choose k out of n.
 double log_choices(double n, double k) {
-  return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
+  return log_gamma(n + 1) - log_gamma(k + 1) - log_gamma(n - k + 1);
 }
 
 /// How many readings jump away from the others of their dwell by this bit, and would lie next to

@@ -26,6 +26,8 @@ double chi_squared_tail(double x, double dof) {
   return Eigen::numext::igammac(0.5 * dof, 0.5 * x);
 }
 
+double log_gamma(double x) { return Eigen::numext::lgamma(x); }
+
 double f_tail(double f, double dof1, double dof2) {
   assert(dof1 > 0 && dof2 > 0);
   if (!(f > 0)) return 1;

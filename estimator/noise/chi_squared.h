@@ -1,4 +1,4 @@
-// χ² and normal distributions, as far as limits and p-values need them.
+// χ² and normal distributions and ln Γ, as far as limits and p-values need them.
 #pragma once
 
 namespace plumbline {
@@ -8,6 +8,9 @@ double chi_squared_tail(double x, double dof);
 
 /// P(F > f) of the F distribution with dof1, dof2 > 0 degrees of freedom; χ² in the limit.
 double f_tail(double f, double dof1, double dof2);
+
+/// ln Γ(x), x > 0. Not std::lgamma, which writes a global sign and so races between threads.
+double log_gamma(double x);
 
 /// x with P(χ²_dof ≤ x) = p, 0 < p < 1, dof > 0 (not necessarily whole).
 double chi_squared_quantile(double p, double dof);

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 
+#include "estimator/noise/chi_squared.h"
 #include "tests/study/diagnosis.h"
 
 namespace plumbline::study {
@@ -16,7 +17,7 @@ namespace {
 double at_least(int k, int n, double p) {
   double sum = 0;
   for (int j = k; j <= n; ++j) {
-    sum += std::exp(std::lgamma(n + 1.0) - std::lgamma(j + 1.0) - std::lgamma(n - j + 1.0) +
+    sum += std::exp(log_gamma(n + 1.0) - log_gamma(j + 1.0) - log_gamma(n - j + 1.0) +
                     j * std::log(p) + (n - j) * std::log1p(-p));
   }
   return sum;
