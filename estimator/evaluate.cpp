@@ -41,10 +41,8 @@ struct Applied {
   }
 };
 
-Applied apply(const CertifiedModel& model, const MeasurementSet& set,
-              const RunDescription& description, const std::vector<PoseMean>& poses,
-              BetweenSets head) {
-  VisitLog log = make_visit_log(set, description);
+Applied apply(const CertifiedModel& model, const MeasurementSet& set, VisitLog log,
+              const std::vector<PoseMean>& poses, BetweenSets head) {
   put_in_front(model.history, head, log);
   RestoredModel restored = restore_model(model, log);
   PerAxis<Eigen::VectorXd> predicted_V = predict_means_V(log, restored.parameters);
@@ -78,14 +76,18 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   result.before = figures(model.twelve, twelve_V, set, poses);
 
   // Nothing recorded says whether the head went elsewhere in between, but the first poses show it.
-  const Applied elsewhere = apply(model, set, description, poses, BetweenSets::anywhere);
-  const Applied from_there = apply(model, set, description, poses, BetweenSets::nowhere);
-  const bool stayed = head ? *head == BetweenSets::nowhere
-                           : from_there.square_mps2() < elsewhere.square_mps2();
-  const Applied& applied = stayed ? from_there : elsewhere;
-  result.head = stayed ? BetweenSets::nowhere : BetweenSets::anywhere;
+  const VisitLog log = make_visit_log(set, description);
+  result.head = head.value_or(BetweenSets::anywhere);
+  Applied applied = apply(model, set, log, poses, result.head);
+  if (!head && !model.history.visits.empty()) {
+    Applied from_there = apply(model, set, log, poses, BetweenSets::nowhere);
+    if (from_there.square_mps2() < applied.square_mps2()) {
+      applied = std::move(from_there);
+      result.head = BetweenSets::nowhere;
+    }
+  }
   result.after = applied.figures;
-  result.left_out = applied.left_out;
+  result.left_out = std::move(applied.left_out);
   return result;
 }
 

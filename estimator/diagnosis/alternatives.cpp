@@ -71,8 +71,7 @@ std::vector<Alternative> proven_rivals(const SearchInput& input, const Candidate
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
                                            const SearchResult& result, std::size_t index) {
   const Candidate& found = result.evidence[index].candidate;
-  EnlargedParameters base = result.fit.parameters;
-  base.effects.erase(base.effects.begin() + static_cast<std::ptrdiff_t>(index));
+  const EnlargedParameters base = without_effect(result.fit.parameters, index);
   if (found.effect->certain(input.log)) return proven_rivals(input, list, result, base, found);
   const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
   const double found_gain = without.chi2 - result.fit.chi2;

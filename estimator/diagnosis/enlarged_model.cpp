@@ -46,11 +46,11 @@ ActiveEffect with_shapes_held(ActiveEffect active) {
   return active;
 }
 
+Eigen::Index ActiveEffect::free_count() const { return std::count(free.begin(), free.end(), true); }
+
 Eigen::Index EnlargedParameters::free_count() const {
   Eigen::Index count = 4 * kAxes;
-  for (const ActiveEffect& active : effects) {
-    for (const bool is_free : active.free) count += is_free ? 1 : 0;
-  }
+  for (const ActiveEffect& active : effects) count += active.free_count();
   return count;
 }
 
@@ -110,6 +110,11 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 
 EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active) {
   model.effects.push_back(active);
+  return model;
+}
+
+EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect) {
+  model.effects.erase(model.effects.begin() + static_cast<std::ptrdiff_t>(effect));
   return model;
 }
 

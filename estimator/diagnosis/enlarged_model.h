@@ -16,6 +16,8 @@ struct ActiveEffect {
   std::size_t axis = 0;    ///< of a sensor effect
   std::vector<double> p;   ///< values, in the order of effect->parameters()
   std::vector<bool> free;  ///< which of them are estimated
+
+  Eigen::Index free_count() const;
 };
 
 /// Axes whose readings the effect changes: one for a sensor effect, all three for the head.
@@ -44,8 +46,9 @@ std::vector<HeadGeometry> head_geometries(const VisitLog& log,
 std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
                                                const EnlargedParameters& parameters);
 
-/// The model with one more effect.
+/// The model with one more effect; without that of an index.
 EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active);
+EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect);
 
 /// What a term of an axis may depend on at one visit, `twelve` being the axis's parameters and
 /// `a_g` the specific forces of all visits, which must live as long.

@@ -46,15 +46,6 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   return exchanges;
 }
 
-/// Of those that are estimated.
-int amplitudes_of(const ActiveEffect& active) {
-  const auto infos = active.effect->parameters();
-  int count = 0;
-  for (std::size_t k = 0; k < infos.size(); ++k)
-    if (active.free[k] && infos[k].role == ParameterRole::amplitude) ++count;
-  return std::max(1, count);
-}
-
 }  // namespace
 
 bool exchange_one(SearchModel& model) {
@@ -84,12 +75,11 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
   if (model.is_certain(chosen) || chosen.effect->subject() == Subject::head ||
       !has_slow_noise(model.input(), model.stage(), axis))
     return false;
-  const EnlargedFit without = model.fit_without({k});
   const Eigen::MatrixXd beside = any_course_of_time(model.input().log);
-  if (!without.determined || !is_slow(model.input(), model.stage().fit.parameters, k, beside))
-    return false;
-  const Stage stage =
-      settle(model.input(), without.parameters, {.known = {}, .start = &model.stage().noise});
+  if (!is_slow(model.input(), model.stage().fit.parameters, k, beside)) return false;
+  const EnlargedFit without = model.fit_without({k});
+  if (!without.determined) return false;
+  const Stage stage = settle(model.input(), without.parameters, {.start = &model.stage().noise});
   PerAxis<bool> axes{};
   axes[axis] = true;
   const auto is_open = [&](const Candidate& c) {
@@ -103,8 +93,8 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
     Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};
     before.known[axis] = nullptr;
     const Stage stage_with = settle_noise(model.input(), with, before);
-    return stage_with.noise[axis].likelihood_deviance +
-           model.price(candidate, amplitudes_of(active));
+    const auto amplitudes = std::max(1, static_cast<int>(with_shapes_held(active).free_count()));
+    return stage_with.noise[axis].likelihood_deviance + model.price(candidate, amplitudes);
   };
   const double now =
       cost(model.stage().fit.parameters, model.stage().fit.parameters.effects[k], model.index(k));

@@ -140,10 +140,9 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
     gains.clear();
     const auto with = heldout_mps2(heldout, partitions, found.fit);
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
-      EnlargedParameters fewer = found.fit.parameters;
-      const ActiveEffect removed = fewer.effects[k];
-      fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
-      EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening, fewer);
+      const ActiveEffect removed = found.fit.parameters.effects[k];
+      EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening,
+                                         without_effect(found.fit.parameters, k));
       if (!without.determined) {
         gains.push_back(0);
         continue;

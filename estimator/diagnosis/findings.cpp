@@ -36,10 +36,7 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
                                                const EnlargedEstimate& estimate,
                                                std::size_t effect) {
   Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
-  for (std::size_t e = 0; e < effect; ++e) {
-    const auto& free = estimate.parameters.effects[e].free;
-    row += std::count(free.begin(), free.end(), true);
-  }
+  for (std::size_t e = 0; e < effect; ++e) row += estimate.parameters.effects[e].free_count();
   const ActiveEffect& active = estimate.parameters.effects[effect];
   const auto infos = active.effect->parameters();
   std::vector<double> values = active.p;

@@ -118,9 +118,7 @@ double heldout_dwell_gain(const VisitLog& log, const Observations& observed,
                           const std::vector<Blocks>& partitions) {
   const ActiveEffect& active = fit.parameters.effects[k];
   if (!active.effect->within_dwell()) return 0;
-  EnlargedParameters fewer = fit.parameters;
-  fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(k));
-  const auto without_V = predict_dwells_V(log, fewer);
+  const auto without_V = predict_dwells_V(log, without_effect(fit.parameters, k));
   const auto with_V = predict_dwells_V(log, fit.parameters);
   const std::vector<std::size_t> axes = axes_of(active);
   const Eigen::Index n = std::ssize(log.visits), contrasts = log.dwell_contrasts();

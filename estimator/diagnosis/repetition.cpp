@@ -52,7 +52,7 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
     for (const Candidate& one : likeliest(model, ones, without)) {
       const ActiveEffect active = one.active();
       const EnlargedFit with = model.fit_with(without.parameters, active);
-      const auto dof = static_cast<int>(std::count(active.free.begin(), active.free.end(), true));
+      const auto dof = static_cast<int>(active.free_count());
       const double cost = with.chi2 + model.price(c, dof);
       if (!with.determined || cost >= best_cost) continue;
       const double p_value = p_of_search(

@@ -67,7 +67,7 @@ double SearchModel::price(std::size_t candidate, int dof) const {
 
 double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
   double sum = 0;
-  for (const std::size_t k : effects) sum += price(chosen_[k], std::max(1, dof_of(k)));
+  for (const std::size_t k : effects) sum += price(chosen_[k], dof_of(k));
   return sum;
 }
 
@@ -121,12 +121,12 @@ EnlargedParameters SearchModel::linear_start(std::size_t candidate) const {
 EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) const {
   EnlargedParameters fewer = stage_.fit.parameters;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k)
-    fewer.effects.erase(fewer.effects.begin() + static_cast<std::ptrdiff_t>(*k));
+    fewer = without_effect(std::move(fewer), *k);
   return fit(fewer);
 }
 
 bool SearchModel::adopt(const EnlargedParameters& parameters) {
-  Before before{.known = {}, .start = &stage_.noise};
+  Before before{.start = &stage_.noise};
   for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
     if (same_on_axis(parameters, stage_.fit.parameters, axis))
       before.known[axis] = &stage_.noise[axis];
@@ -163,6 +163,7 @@ void SearchModel::forget(std::size_t effect) {
   chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(effect));
   p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(effect));
 }
+
 /// Puts one of those close to the newcomer in its place that explains clearly more.
 void SearchModel::look_closer() {
   constexpr double kClearly = 10;
@@ -212,19 +213,17 @@ void SearchModel::drop_superfluous() {
 }
 
 int SearchModel::dof_of(std::size_t effect) const {
-  const auto& free = stage_.fit.parameters.effects[effect].free;
-  return static_cast<int>(std::count(free.begin(), free.end(), true));
+  return static_cast<int>(
+      std::max<Eigen::Index>(1, stage_.fit.parameters.effects[effect].free_count()));
 }
 
 SearchResult SearchModel::take_result() {
   SearchResult result;
   result.evidence.resize(chosen_.size());
   parallel_for(chosen_.size(), [&](std::size_t k) {
-    const std::vector<bool>& free = stage_.fit.parameters.effects[k].free;
-    const auto dof = std::max<std::ptrdiff_t>(1, std::count(free.begin(), free.end(), true));
     const double lost = fit_without({k}).chi2 - stage_.fit.chi2;
     result.evidence[k] = {candidate(k), p_values_[k],
-                          sigmas_of(log_chi_squared_tail(lost, static_cast<double>(dof)))};
+                          sigmas_of(log_chi_squared_tail(lost, dof_of(k)))};
   });
   responses();
   result.responses = std::move(*responses_);

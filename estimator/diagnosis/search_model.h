@@ -81,6 +81,7 @@ class SearchModel {
   bool adopt(const EnlargedParameters& parameters);
   void look_closer();
   void forget(std::size_t effect);
+  /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;
   double p_of_removal(const EnlargedFit& without) const;
 

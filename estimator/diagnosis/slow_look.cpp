@@ -37,28 +37,29 @@ struct SlowCandidates {
 SlowCandidates slow_candidates(const SearchInput& input, const CandidateList& list,
                                const EnlargedParameters& model, const PerAxis<bool>& looked_at,
                                const SlowLook& look) {
-  SlowCandidates slow;
+  CandidateList open;
+  open.family_size = list.family_size;
+  std::vector<std::size_t> index;
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
     const Candidate& candidate = list.candidates[c];
     if (candidate.effect->subject() == Subject::head || candidate.effect->within_dwell() ||
         !looked_at[candidate.axis] || !look.is_open(candidate))
       continue;
-    slow.list.candidates.push_back(candidate);
-    slow.index.push_back(c);
+    open.candidates.push_back(candidate);
+    index.push_back(c);
   }
-  slow.list.family_size = list.family_size;
-  slow.responses_V = candidate_responses_V(input.log, slow.list, model);
+  const CandidateResponses responses_V = candidate_responses_V(input.log, open, model);
   const Eigen::MatrixXd basis = orthonormal_basis(look.beside);
+  SlowCandidates slow;
+  slow.list.family_size = list.family_size;
   std::vector<std::size_t> within;
-  for (std::size_t c = 0; c < slow.index.size(); ++c)
-    if (is_within(slow.responses_V, c, basis)) within.push_back(c);
-  for (std::size_t k = 0; k < within.size(); ++k) {
-    slow.list.candidates[k] = slow.list.candidates[within[k]];
-    slow.index[k] = slow.index[within[k]];
+  for (std::size_t c = 0; c < index.size(); ++c) {
+    if (!is_within(responses_V, c, basis)) continue;
+    slow.list.candidates.push_back(open.candidates[c]);
+    slow.index.push_back(index[c]);
+    within.push_back(c);
   }
-  slow.list.candidates.resize(within.size());
-  slow.index.resize(within.size());
-  slow.responses_V = some_of(slow.responses_V, within);
+  slow.responses_V = some_of(responses_V, within);
   return slow;
 }
 
@@ -66,13 +67,12 @@ SlowCandidates slow_candidates(const SearchInput& input, const CandidateList& li
 /// more when its noise is known; the likelihood is that of those.
 Stage settle_beside(const SearchInput& input, const EnlargedParameters& model, const Stage& stage,
                     const Eigen::MatrixXd& slow) {
-  Stage rich = settle_noise(input, model, {.known = {}, .start = &stage.noise}, slow);
+  Stage rich = settle_noise(input, model, {.start = &stage.noise}, slow);
   if (rich.coarse == PerAxis<bool>{}) return rich;
   Before before{.known = all_of(rich.noise), .start = &rich.noise, .freed = &rich};
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (rich.coarse[axis]) before.known[axis] = nullptr;
-  PerAxis<PooledNoise> noise = settle_noise(input, model, before, slow).noise;
-  rich.noise = std::move(noise);
+  rich.noise = settle_noise(input, model, before, slow).noise;
   return rich;
 }
 
@@ -90,8 +90,7 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
     PerAxis<Eigen::VectorXd> powers;
     for (std::size_t i = 0; i < kAxisCount; ++i)
       powers[i] = plain[i].power + share * (rich.noise[i].power - plain[i].power);
-    const Stage stage = settle_noise(
-        input, model, {.known = {}, .start = nullptr, .powers = &powers, .freed = &rich});
+    const Stage stage = settle_noise(input, model, {.powers = &powers, .freed = &rich});
     const EnlargedFit fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
     responses = whitened(slow.responses_V, input.log, stage.whitening);
     gains_of.emplace(responses, fit);
@@ -109,12 +108,10 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
 
 bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::size_t effect,
              const Eigen::MatrixXd& beside) {
-  EnlargedParameters without = model;
-  without.effects.erase(without.effects.begin() + static_cast<std::ptrdiff_t>(effect));
   const std::size_t axis = model.effects[effect].axis;
-  return is_within(
-      predict_means_V(input.log, model)[axis] - predict_means_V(input.log, without)[axis],
-      orthonormal_basis(beside));
+  const auto with_V = predict_means_V(input.log, model);
+  const auto without_V = predict_means_V(input.log, without_effect(model, effect));
+  return is_within(with_V[axis] - without_V[axis], orthonormal_basis(beside));
 }
 
 bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis) {
@@ -136,7 +133,7 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
   constexpr double kHopeless = 0.9;  // to first order: its own noise and shapes gain it more
   const EnlargedParameters& model = stage.fit.parameters;
   const Stage rich = settle_beside(input, model, stage, look.beside);
-  Before before{.known = {}, .start = &stage.noise, .freed = &rich};
+  Before before{.start = &stage.noise, .freed = &rich};
   // The noise that was handed in may have been estimated beside more than the model.
   for (std::size_t axis = 0; noise_is_own && axis < kAxisCount; ++axis)
     if (!rich.coarse[axis]) before.known[axis] = &stage.noise[axis];

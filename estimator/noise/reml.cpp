@@ -435,8 +435,10 @@ PooledNoise NoisePool::climb(const Eigen::VectorXd& first, const std::vector<boo
 
 PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                           const Eigen::MatrixXd& design) const {
-  const Point point = evaluate(power, mean, design);
-  return {power, covariance(power), point.deviance, point.likelihood_deviance, true};
+  const Projector projector = make_projector(lower_covariance(power), design);
+  const double deviance =
+      record_at(power).deviance + projector.log_determinant + mean.dot(projector.P * mean);
+  return {power, covariance(power), deviance, deviance - projector.log_determinant_of_design, true};
 }
 
 NoiseModel without_record(NoiseModel model) {
