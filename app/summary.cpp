@@ -178,6 +178,11 @@ std::string evaluation_summary(const Evaluation& evaluation, const std::optional
         "version found it: {}.\n",
         fmt::join(evaluation.left_out, ", "));
   }
+  if (!evaluation.decided_otherwise.empty()) {
+    text += fmt::format(
+        "The calibration run left open which way the head goes; these poses tell: {}.\n",
+        fmt::join(evaluation.decided_otherwise, ", "));
+  }
   return text;
 }
 

@@ -232,9 +232,11 @@ struct EvaluationFigures {
 struct Evaluation {
   std::size_t poses = 0;
   std::size_t samples = 0;
-  EvaluationFigures before;  ///< the 12 parameters alone
-  EvaluationFigures after;   ///< the certified model
+  EvaluationFigures before;                  ///< the 12 parameters alone
+  EvaluationFigures after;                   ///< the certified model
   BetweenSets head = BetweenSets::anywhere;  ///< between the calibration run and this set
+  /// Effects with parameters that the calibration run had left open and this set decided otherwise.
+  std::vector<std::string> decided_otherwise;
   /// What of it is not applied: it belonged to the run, needs a column that the set lacks, or is a
   /// term that this version does not have.
   std::vector<std::string> left_out;
@@ -254,7 +256,8 @@ CertifiedModel certified_model(const Calibration& calibration,
 
 /// Where its times say that the set followed the calibration run, effects that remember what came
 /// before go on from there. `head`: how it came to the first pose of the set; where that is not
-/// known, the way that leaves less.
+/// known, the way that leaves less. So with what the run left open of an effect
+/// (Effect::left_open_by).
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
                     const RunDescription& description, std::optional<BetweenSets> head = {});
 

@@ -32,22 +32,40 @@ EvaluationFigures figures(const TriadEstimate& model, const PerAxis<Eigen::Vecto
 /// The certified model on another set.
 struct Applied {
   EvaluationFigures figures;
-  std::vector<std::string> left_out;
-
-  double square_mps2() const {
-    double sum = 0;
-    for (const double rms : figures.pose_rms_mps2) sum += rms * rms;
-    return sum;
-  }
+  std::vector<std::string> left_out, decided_otherwise;
 };
+
+/// Sum over the axes.
+double square_mps2(const EvaluationFigures& figures) {
+  double sum = 0;
+  for (const double rms : figures.pose_rms_mps2) sum += rms * rms;
+  return sum;
+}
 
 Applied apply(const CertifiedModel& model, const MeasurementSet& set, VisitLog log,
               const std::vector<PoseMean>& poses, BetweenSets head) {
   put_in_front(model.history, head, log);
   RestoredModel restored = restore_model(model, log);
-  PerAxis<Eigen::VectorXd> predicted_V = predict_means_V(log, restored.parameters);
-  for (Eigen::VectorXd& axis : predicted_V) axis = axis.tail(std::ssize(poses)).eval();
-  return {figures(model.final, predicted_V, set, poses), std::move(restored.left_out)};
+  const auto with = [&](const EnlargedParameters& parameters) {
+    PerAxis<Eigen::VectorXd> predicted_V = predict_means_V(log, parameters);
+    for (Eigen::VectorXd& axis : predicted_V) axis = axis.tail(std::ssize(poses)).eval();
+    return figures(model.final, predicted_V, set, poses);
+  };
+  Applied best{with(restored.parameters), std::move(restored.left_out), {}};
+  if (log.goes_as_commanded) return best;  // nothing of a rig of our own is open
+  for (ActiveEffect& active : restored.parameters.effects) {
+    for (const auto& other : active.effect->left_open_by(model.history, active.p)) {
+      const std::vector<double> found = std::exchange(active.p, other);
+      const EvaluationFigures otherwise = with(restored.parameters);
+      if (square_mps2(otherwise) < square_mps2(best.figures)) {
+        best.figures = otherwise;
+        best.decided_otherwise = {active.effect->id()};
+      } else {
+        active.p = found;
+      }
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -81,13 +99,14 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   Applied applied = apply(model, set, log, poses, result.head);
   if (!head && !model.history.visits.empty()) {
     Applied from_there = apply(model, set, log, poses, BetweenSets::nowhere);
-    if (from_there.square_mps2() < applied.square_mps2()) {
+    if (square_mps2(from_there.figures) < square_mps2(applied.figures)) {
       applied = std::move(from_there);
       result.head = BetweenSets::nowhere;
     }
   }
   result.after = applied.figures;
   result.left_out = std::move(applied.left_out);
+  result.decided_otherwise = std::move(applied.decided_otherwise);
   return result;
 }
 

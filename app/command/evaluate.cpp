@@ -81,7 +81,9 @@ void add_evaluate(CLI::App& program, Invocation& invocation) {
   sub->add_flag("--skip-bad-rows", options->skip_bad_rows,
                 "Skip and count rows that cannot be used, instead of refusing the file");
   sub->footer(
-      "Whether the head moved between the calibration run and the set is told from the readings. "
+      "Whether the head moved between the calibration run and the set is told from the readings; "
+      "so "
+      "is the way round it goes, where backlash was found and the run left that open. "
       "Exit codes: 0 done, within the limits if [limits] were given; 1 done, limits exceeded on at "
       "least one pose; 2 wrong use; 4 internal error.");
   sub->callback(

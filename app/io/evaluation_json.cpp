@@ -42,6 +42,7 @@ Json evaluation_json(const Evaluation& evaluation, std::size_t skipped_rows,
             {"skipped_rows", skipped_rows}}},
           {"error", {{"before", to_json(evaluation.before)}, {"after", to_json(evaluation.after)}}},
           {"left_out", evaluation.left_out},
+          {"decided_otherwise", evaluation.decided_otherwise},
           {"decision", decision}};
 }
 

@@ -101,6 +101,12 @@ class Effect {
   virtual bool certain(const VisitLog&) const { return false; }
   /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.
   virtual double choice_uncertainty(const VisitLog&, std::size_t, std::size_t) const { return 0; }
+  /// Other parameters that may be true of a later set although `p` was found on `run`: they say
+  /// the same of all of that, or concern how the head comes to the first pose of a set.
+  virtual std::vector<std::vector<double>> left_open_by(const RunHistory& /*run*/,
+                                                        const std::vector<double>& /*p*/) const {
+    return {};
+  }
   /// Whether it may stand in a model more than once for one axis: at another pose, say.
   virtual bool repeats() const { return false; }
   /// The same response by parameters as one would state them: positive amplitudes, angles within

@@ -55,6 +55,22 @@ class Backlash final : public Effect {
       direction = start_direction(log, visit, way, static_cast<int>(std::lround(p[2])));
     head.delta_rad += 0.5 * p[0] * direction * effect::kRadPerDeg;
   }
+  std::vector<std::vector<double>> left_open_by(const RunHistory& run,
+                                                const std::vector<double>& p) const override {
+    const VisitLog log = log_of(run);
+    const bool one_way = std::all_of(log.visits.begin(), log.visits.end(), [](const Visit& visit) {
+      return visit.delta_direction[0] == visit.delta_direction[1];
+    });
+    std::vector<std::vector<double>> open;
+    for (int way = 0; way < 2; ++way) {
+      for (int start = 0; start < kStarts; ++start) {
+        const std::vector<double> other = {p[0], static_cast<double>(way),
+                                           static_cast<double>(start)};
+        if (other != p && (one_way || other[1] == p[1])) open.push_back(other);
+      }
+    }
+    return open;
+  }
 
  private:
   static int start_direction(const VisitLog& log, std::size_t visit, std::size_t way, int start) {

@@ -116,6 +116,11 @@ std::array<int, 2> direction_of_arrival(const VisitLog& log, std::size_t visit) 
   return before ? direction_after(*before, log.visits[visit].delta_rad) : std::array<int, 2>{};
 }
 
+void set_directions(VisitLog& log) {
+  for (std::size_t k = 0; k < log.visits.size(); ++k)
+    log.visits[k].delta_direction = direction_of_arrival(log, k);
+}
+
 }  // namespace
 
 std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
@@ -130,6 +135,15 @@ std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
 
 RunHistory history_of(const VisitLog& log) {
   return {log.has_temperature, log.covariate_names, log.visits};
+}
+
+VisitLog log_of(const RunHistory& history) {
+  VisitLog log;
+  log.has_temperature = history.has_temperature;
+  log.covariate_names = history.covariate_names;
+  log.visits = history.visits;
+  set_directions(log);
+  return log;
 }
 
 void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log) {
@@ -157,8 +171,7 @@ void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log) {
   log.visits.insert(log.visits.begin(), all.begin(), all.end());
   log.earlier = all.size();
   log.moved_since = head == BetweenSets::anywhere;
-  for (std::size_t k = 0; k < log.visits.size(); ++k)
-    log.visits[k].delta_direction = direction_of_arrival(log, k);
+  set_directions(log);
 }
 
 double VisitLog::step_V(std::size_t axis) const {

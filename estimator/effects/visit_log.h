@@ -81,6 +81,8 @@ struct RunHistory {
   std::vector<Visit> visits;
 };
 RunHistory history_of(const VisitLog& log);
+/// A log of these visits, of which nothing else is known.
+VisitLog log_of(const RunHistory& history);
 
 /// Where the head went between two sets.
 enum class BetweenSets { nowhere, anywhere };

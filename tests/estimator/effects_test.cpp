@@ -20,6 +20,12 @@
 namespace plumbline {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::Not;
+using ::testing::SizeIs;
+
 // 12 × 5 positions visited in a snake, with a temperature and a humidity that move; visits `from`
 // to `to` alone.
 VisitLog example_log(int from = 0, int to = 60) {
@@ -291,6 +297,27 @@ TEST(Backlash, TheWayIsThatOfTheDriveWhereItIsKnown) {
     ASSERT_FALSE(hypotheses.empty());
     for (const Hypothesis& hypothesis : hypotheses) EXPECT_EQ(hypothesis.p[1], way);
   }
+}
+
+TEST(Backlash, ARunThatNeverGoesTheLongWayLeavesOpenWhichWayItIs) {
+  const auto all = effect_catalogue();
+  const auto backlash = *std::find_if(
+      all.begin(), all.end(), [](const Effect* effect) { return effect->id() == "rig.backlash"; });
+  const auto run_through = [](const std::vector<double>& delta_deg) {
+    RunHistory run;
+    for (const double delta : delta_deg) {
+      run.visits.emplace_back();
+      run.visits.back().delta_rad = delta * std::numbers::pi / 180;
+    }
+    return run;
+  };
+  // How it comes to the first pose of a set is open in any case.
+  const std::vector<double> found = {0.1, 0, 0};
+  const auto other_way = Contains(ElementsAre(0.1, 1, 0));
+  EXPECT_THAT(backlash->left_open_by(run_through({0, 120, 240, 120, 0}), found),
+              AllOf(SizeIs(5), other_way));
+  EXPECT_THAT(backlash->left_open_by(run_through({0, 120, 240, 0, 120}), found),
+              AllOf(SizeIs(2), Not(other_way)));
 }
 
 // What hardly changes over a run would take the place of the 12 parameters.

@@ -102,6 +102,16 @@ TEST(DiagnosisStudy, WhatVariesIsOneFindingWithItsMean) {
   EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
+// In serpentine order the shorter way round is the only one; between fresh poses it is not, and the
+// simulated head goes the other.
+TEST(DiagnosisStudy, FreshPosesTellWhichWayRoundTheHeadGoes) {
+  const SetOutcome outcome = run_set({.seed = 5, .effects = {"rig.backlash"}, .size = 10});
+  ASSERT_TRUE(outcome.feasible);
+  ASSERT_EQ(outcome.named, 1) << outcome.found;
+  EXPECT_GT(outcome.after.fresh, 2 * outcome.oracle.fresh) << "the run alone tells";
+  EXPECT_LT(outcome.evaluated_fresh, 1.15 * outcome.oracle.fresh);
+}
+
 // The humidity goes on falling after the run, and the average of its past is where the run left it.
 TEST(DiagnosisStudy, FreshPosesGoOnWhereTheRunEnded) {
   const SetOutcome outcome = run_set({.seed = 410001,
