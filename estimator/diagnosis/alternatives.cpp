@@ -57,7 +57,7 @@ std::vector<Alternative> proven_rivals(const SearchInput& input, const Candidate
   std::vector<Alternative> rivals;
   for (const Candidate& candidate : list.candidates) {
     if (candidate.axis != found.axis || candidate.effect == found.effect ||
-        !candidate.effect->certain(input.log))
+        !candidate.effect->certain(input.log, candidate.axis))
       continue;
     EnlargedFit fit = fit_from_levels(input.log, result.observed, result.whitening,
                                       with_effect(base, candidate.active()));
@@ -72,7 +72,8 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
                                            const SearchResult& result, std::size_t index) {
   const Candidate& found = result.evidence[index].candidate;
   const EnlargedParameters base = without_effect(result.fit.parameters, index);
-  if (found.effect->certain(input.log)) return proven_rivals(input, list, result, base, found);
+  if (found.effect->certain(input.log, found.axis))
+    return proven_rivals(input, list, result, base, found);
   const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
   const double found_gain = without.chi2 - result.fit.chi2;
   const auto found_free =

@@ -37,7 +37,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
       continue;
     const EnlargedFit with = model.fit_with(without.parameters, candidate.active());
     if (!with.determined) continue;
-    const double cost = with.chi2 + model.price(index, std::max(1, gains.dof(index)));
+    const double cost = with.chi2 + model.price(index);
     if (!(cost < model.stage().fit.chi2 + spent - kClearly)) continue;
     const double p =
         model.p_of(model.log_p_of(index, without.chi2 - with.chi2, gains.dof(index), with));
@@ -88,17 +88,14 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
   const auto found = look_among_slow(model.input(), model.list(), stage, true,
                                      {beside, axes, 1, model.false_alarm_of_slow(), is_open});
   if (!found || !found->significant || found->candidate == model.index(k)) return false;
-  const auto cost = [&](const EnlargedParameters& with, const ActiveEffect& active,
-                        std::size_t candidate) {
+  const auto cost = [&](const EnlargedParameters& with, std::size_t candidate) {
     Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};
     before.known[axis] = nullptr;
     const Stage stage_with = settle_noise(model.input(), with, before);
-    const auto amplitudes = std::max(1, static_cast<int>(with_shapes_held(active).free_count()));
-    return stage_with.noise[axis].likelihood_deviance + model.price(candidate, amplitudes);
+    return stage_with.noise[axis].likelihood_deviance + model.price(candidate);
   };
-  const double now =
-      cost(model.stage().fit.parameters, model.stage().fit.parameters.effects[k], model.index(k));
-  const double then = cost(found->model, found->model.effects.back(), found->candidate);
+  const double now = cost(model.stage().fit.parameters, model.index(k));
+  const double then = cost(found->model, found->candidate);
   return then < now - kClearly &&
          model.exchange({k}, {found->candidate, found->p_value, found->model});
 }

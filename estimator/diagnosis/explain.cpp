@@ -153,7 +153,8 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
                                    heldout_dwell_gain(search.log, found.observed, found.whitening,
                                                       found.fit, k, partitions));
       // One pose's own error cannot be predicted from other poses.
-      const bool own = removed.effect->concerns_one_visit() || removed.effect->certain(search.log);
+      const bool own =
+          removed.effect->concerns_one_visit() || removed.effect->certain(search.log, removed.axis);
       if (gain > 0 || own) {
         gains.push_back(std::max(gain, 0.0));
         continue;

@@ -51,7 +51,7 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
       parameter.u = std::sqrt(std::max(estimate.covariance(row, row), 0.0));
       ++row;
     } else {
-      parameter.u = active.effect->choice_uncertainty(log, active.axis, k);
+      parameter.u = active.effect->choice_uncertainty(log, active.axis, active.p, k);
     }
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
     if (infos[k].role == ParameterRole::index && infos[k].unit == "s") place(log, parameter);

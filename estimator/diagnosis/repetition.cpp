@@ -44,16 +44,18 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
   for (std::size_t c = 0; c < model.list().candidates.size(); ++c) {
     const Candidate& candidate = model.list().candidates[c];
     if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
+    if (candidate.effect != repeated.effect && model.is_chosen(candidate)) continue;
     tried = candidate.effect;
     CandidateList ones;
-    for (const Hypothesis& hypothesis : tried->in_one(repeated.effect->id(), p))
+    for (const Hypothesis& hypothesis :
+         tried->in_one(model.input().log, candidate.axis, repeated.effect->id(), p))
       ones.candidates.push_back(
           {.effect = tried, .axis = candidate.axis, .hypothesis = hypothesis});
     for (const Candidate& one : likeliest(model, ones, without)) {
       const ActiveEffect active = one.active();
       const EnlargedFit with = model.fit_with(without.parameters, active);
       const auto dof = static_cast<int>(active.free_count());
-      const double cost = with.chi2 + model.price(c, dof);
+      const double cost = with.chi2 + model.price(c);
       if (!with.determined || cost >= best_cost) continue;
       const double p_value = p_of_search(
           log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks);
@@ -73,7 +75,8 @@ std::vector<std::size_t> of_regular_steps(const SearchModel& model, std::size_t 
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& chosen = model.candidate(k);
     if (chosen.axis == axis &&
-        (is_step(chosen) || !chosen.effect->in_one("sensor.bias_step", any_train).empty()))
+        (is_step(chosen) ||
+         !chosen.effect->in_one(model.input().log, axis, "sensor.bias_step", any_train).empty()))
       found.push_back(k);
   }
   return found;
@@ -116,7 +119,7 @@ void tell_in_one(SearchModel& model) {
       instances.push_back(l);
       p.push_back(model.stage().fit.parameters.effects[l].p);
     }
-    if (instances.size() > 1 && replace_in_one(model, instances, first, p, model.looks())) return;
+    if (replace_in_one(model, instances, first, p, model.looks())) return;
   }
 }
 

@@ -58,16 +58,17 @@ PerAxis<double> SearchModel::false_alarm_of_slow() const {
   return share;
 }
 
-double SearchModel::price(std::size_t candidate, int dof) const {
+double SearchModel::price(std::size_t candidate) const {
   const Candidate& c = list_.candidates[candidate];
-  constexpr double kPerParameter = 7;  // about 2·ln of the number of poses
+  constexpr double kPerAmplitude = 7;  // about 2·ln of the number of poses
+  const Eigen::Index amplitudes = with_shapes_held(c.active()).free_count();
   return 2 * (std::log(static_cast<double>(list_.family_size[c.family])) + c.handicap) +
-         kPerParameter * dof;
+         kPerAmplitude * static_cast<double>(std::max<Eigen::Index>(1, amplitudes));
 }
 
 double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
   double sum = 0;
-  for (const std::size_t k : effects) sum += price(chosen_[k], dof_of(k));
+  for (const std::size_t k : effects) sum += price(chosen_[k]);
   return sum;
 }
 
@@ -147,7 +148,7 @@ const CandidateResponses& SearchModel::responses() {
 }
 
 bool SearchModel::is_certain(const Candidate& candidate) const {
-  return candidate.effect->certain(input_.log);
+  return candidate.effect->certain(input_.log, candidate.axis);
 }
 
 bool SearchModel::is_chosen(const Candidate& candidate) const {

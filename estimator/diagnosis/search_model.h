@@ -42,9 +42,9 @@ class SearchModel {
   /// log of the probability that noise alone gives a candidate this gain. A single reading of a
   /// coarse converter strays further than Gaussian noise, but by no more than a step.
   double log_p_of(std::size_t candidate, double gain, int dof, const EnlargedFit& with) const;
-  /// What a candidate must gain in χ² to be worth its freedom, its choice among many and its want
-  /// of a name.
-  double price(std::size_t candidate, int dof) const;
+  /// What a candidate must gain in χ² to be worth its amplitudes, its choice among many (which its
+  /// shapes are part of) and its want of a name.
+  double price(std::size_t candidate) const;
   /// What some of the model's effects had to gain together.
   double price_of(const std::vector<std::size_t>& effects) const;
 

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "estimator/effects/effect.h"
 
@@ -7,6 +9,11 @@ namespace {
 
 // Rounding to a step that the description of the run does not declare. How far the noise of a
 // reading rounds the stairs off is estimated with it: readings that hardly change say little of it.
+//
+// A coarser step than the declared one shows in the codes. A finer one does not: what is rounded
+// twice has every code, but the edges between them lie at edges of the finer lattice, up to half
+// of its step away. From code to code that goes up and down as a wave, and is looked for where one
+// was found.
 class Quantization final : public Effect {
  public:
   std::string id() const override { return "adc.quantization"; }
@@ -16,13 +23,23 @@ class Quantization final : public Effect {
             {"origin", "V", ParameterRole::index},
             {"noise", "V", ParameterRole::shape}};
   }
-  double choice_uncertainty(const VisitLog& log, std::size_t axis, std::size_t k) const override {
-    return k == 0 && log.codes[axis].coarser_lattice ? log.codes[axis].coarser_lattice->u_step_V
-                                                     : 0;
+  double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
+                            std::size_t k) const override {
+    if (k != 0) return 0;
+    if (log.codes[axis].coarser_lattice) return log.codes[axis].coarser_lattice->u_step_V;
+    if (!is_finer(log, p[0])) return 0;
+    // Rectangular between the neighbours that were looked at.
+    return kApart * p[0] * p[0] / (log.highest_V[axis] - log.lowest_V[axis]) / std::numbers::sqrt3;
   }
   // Against a declared step the codes prove a coarser one; without it they only suggest one.
-  bool certain(const VisitLog& log) const override { return log.adc.has_value(); }
+  bool certain(const VisitLog& log, std::size_t axis) const override {
+    return log.codes[axis].coarser_lattice.has_value();
+  }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
+    // Of a finer step nothing is known: half the declared one has an edge in the middle between any
+    // two codes and changes nothing.
+    if (shows_finer_step(log, axis))
+      return {{{0.5 * log.adc->lsb_V(), log.adc->min_V, log.input_sd_V[axis]}}};
     // Without a declared converter the smallest difference between two readings is its step.
     const std::optional<Lattice> lattice =
         log.adc ? log.codes[axis].coarser_lattice
@@ -32,13 +49,34 @@ class Quantization final : public Effect {
     const double noise_V = std::max(log.input_sd_V[axis], effect::kLeastNoise * lattice->step_V);
     return {{{lattice->step_V, lattice->origin_V, noise_V}}};
   }
+  // Other finer steps of which the waves look alike.
+  std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
+                                 const Hypothesis& found) const override {
+    if (!shows_finer_step(log, axis)) return {};
+    const double turns = log.adc->lsb_V() / found.p[0];  // from one edge to the next
+    const double part = std::abs(std::remainder(turns, 1));
+    return part > 0 ? finer_steps(log, axis, log.adc->lsb_V() / part, 0)
+                    : std::vector<Hypothesis>{};
+  }
+  std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const std::string& repeated,
+                                 const std::vector<std::vector<double>>& instances) const override {
+    constexpr std::size_t kWave = 4;  // parameters; another shape in the codes is something else
+    if (!repeated.starts_with("unlisted:code_") || instances.size() != 1 ||
+        instances.front().size() != kWave || !shows_finer_step(log, axis))
+      return {};
+    return finer_steps(log, axis, instances.front()[1], kNearby);
+  }
   double term_g(const TermInput& input, const double* p) const override {
+    if (is_finer(input.log, p[0])) return finer_term_g(input, p);
     const double lsb_V = p[0];
     const double sd = std::min(p[2] / lsb_V, effect::kMostNoise);
     const double value = (input.output_V - p[1]) / lsb_V;  // in steps, from the origin
     const double reach = 0.5 + effect::kReach * sd;
     double rounded_V = 0, below = 0;
-    for (double point = std::round(value - reach); point < value + reach + 1; ++point) {
+    const double first = std::round(value - reach);
+    const auto points = static_cast<int>(std::ceil(value + reach + 1 - first));
+    for (int k = 0; k < points; ++k) {
+      const double point = first + k;
       const double upper = effect::share_below(point + 0.5, value, sd);
       rounded_V += (upper - below) * reading_V(input, p, point);
       below = upper;
@@ -47,6 +85,68 @@ class Quantization final : public Effect {
   }
 
  private:
+  static bool is_finer(const VisitLog& log, double lsb_V) {
+    return log.adc && lsb_V < log.adc->lsb_V();
+  }
+  /// Whether readings near an edge between two codes tell where it lies: there is noise that takes
+  /// them over it, and not so much that all edges are one.
+  static bool shows_finer_step(const VisitLog& log, std::size_t axis) {
+    if (!log.adc || log.codes[axis].coarser_lattice || !log.codes[axis].stuck_bits.empty())
+      return false;
+    const double noise = log.input_sd_V[axis] / log.adc->lsb_V();
+    return noise > kLeastOfStep && noise < kMostOfStep;
+  }
+  /// Steps with a wave of this period from code to code: seen at the edges between codes only, one
+  /// of 1/lsb = n/declared ± 1/period looks the same for every n.
+  static std::vector<Hypothesis> finer_steps(const VisitLog& log, std::size_t axis, double period_V,
+                                             int most_nearby) {
+    constexpr int kPlaces = 12;
+    constexpr double kFinest = 0.2;  // of the declared step; finer ones shift no edge enough
+    const double declared_V = log.adc->lsb_V();
+    const double range_V = log.highest_V[axis] - log.lowest_V[axis];
+    std::vector<Hypothesis> found;
+    for (int n = 0; n <= static_cast<int>(1 / kFinest); ++n) {
+      for (const int side : {-1, 1}) {
+        for (int nearby = -most_nearby; nearby <= most_nearby; ++nearby) {
+          const double wave_per_V = 1 / period_V + kApart * nearby / range_V;
+          const double lsb_V = 1 / (n / declared_V + side * wave_per_V);
+          if (!(lsb_V > kFinest * declared_V && lsb_V < declared_V)) continue;
+          // Counted from the middle of the readings, so that steps and places do not depend on each
+          // other.
+          const double middle_V = 0.5 * (log.highest_V[axis] + log.lowest_V[axis]);
+          for (int place = 0; place < kPlaces; ++place)
+            found.push_back({{lsb_V, middle_V + lsb_V * place / kPlaces, log.input_sd_V[axis]}});
+        }
+      }
+    }
+    return found;
+  }
+  /// By how much more a reading says that was rounded to the finer lattice first, undone like
+  /// rounding to the declared one: over the slope of the mean reading there.
+  static double finer_term_g(const TermInput& input, const double* p) {
+    constexpr double kFlattest = 0.1;  // between two edges a mean says little
+    const Adc& adc = *input.log.adc;
+    const double declared_V = adc.lsb_V(), value_V = input.output_V;
+    const double sd_V = std::clamp(p[2], kLeastOfStep * declared_V, declared_V);
+    const double reach_V = effect::kReach * sd_V + p[0] + declared_V;
+    const double first = std::floor((value_V - reach_V - adc.min_V) / declared_V);
+    double more_V = 0, slope = 0;
+    const auto codes = static_cast<int>(std::ceil(2 * reach_V / declared_V)) + 1;
+    for (int k = 0; k < codes; ++k) {
+      const double edge_V = adc.min_V + declared_V * (first + k + 0.5);
+      const double finer_V = p[1] + p[0] * (std::floor((edge_V - p[1]) / p[0]) + 0.5);
+      more_V += declared_V * (effect::share_below(edge_V, value_V, sd_V) -
+                              effect::share_below(finer_V, value_V, sd_V));
+      const double away = (edge_V - value_V) / sd_V;
+      slope += declared_V / sd_V * std::exp(-0.5 * away * away) / std::sqrt(2 * std::numbers::pi);
+    }
+    return more_V / std::max(slope, kFlattest) / input.K_V_per_g;
+  }
+
+  static constexpr int kNearby = 5;
+  static constexpr double kApart = 0.06;  // of finer steps: turns of the phase over all readings
+  static constexpr double kLeastOfStep = 0.1, kMostOfStep = 0.5;  // of noise, declared steps
+
   /// What the declared converter makes of a point of the coarser lattice.
   static double reading_V(const TermInput& input, const double* p, double point) {
     const double at_V = p[1] + p[0] * point;

@@ -27,7 +27,7 @@ class StuckBitEffect final : public Effect {
     }
     return starts;
   }
-  bool certain(const VisitLog&) const override { return true; }
+  bool certain(const VisitLog&, std::size_t) const override { return true; }
   double term_g(const TermInput& input, const double* p) const override {
     const Adc& adc = *input.log.adc;
     // In units of the bit, counted from the lower end of the span: codes with the bit set begin at

@@ -79,8 +79,9 @@ class Effect {
     return {};
   }
   /// Hypotheses that say in one what several `instances` of the effect `repeated` on the same axis
-  /// say one by one; none where they have nothing in common.
-  virtual std::vector<Hypothesis> in_one(const std::string& /*repeated*/,
+  /// say one by one, or what one of them hints at; none where they have nothing in common.
+  virtual std::vector<Hypothesis> in_one(const VisitLog&, std::size_t /*axis*/,
+                                         const std::string& /*repeated*/,
                                          const std::vector<std::vector<double>>& /*p*/) const {
     return {};
   }
@@ -98,9 +99,12 @@ class Effect {
   /// Whether it depends on earlier visits, or on what was recorded then.
   virtual bool remembers() const { return false; }
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
-  virtual bool certain(const VisitLog&) const { return false; }
+  virtual bool certain(const VisitLog&, std::size_t /*axis*/) const { return false; }
   /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.
-  virtual double choice_uncertainty(const VisitLog&, std::size_t, std::size_t) const { return 0; }
+  virtual double choice_uncertainty(const VisitLog&, std::size_t /*axis*/,
+                                    const std::vector<double>& /*p*/, std::size_t /*k*/) const {
+    return 0;
+  }
   /// Other parameters that may be true of a later set although `p` was found on `run`: they say
   /// the same of all of that, or concern how the head comes to the first pose of a set.
   virtual std::vector<std::vector<double>> left_open_by(const RunHistory& /*run*/,

@@ -241,7 +241,7 @@ class Pulses final : public FunctionOfDriver {
     }
     return starts;
   }
-  std::vector<Hypothesis> in_one(const std::string& repeated,
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const std::string& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
     if (target().form != TermForm::bias) return {};
     if (repeated == "sensor.bias_step") return from_steps(instances);
@@ -382,16 +382,30 @@ class PlayLag final : public FunctionOfDriver {
   std::vector<ParameterInfo> parameters() const override {
     return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
     for (const double share : effect::geometric(0.01, 0.64, 7))
-      starts.push_back({{share * (high - low), target().typical_size()}});
+      if (goes_to_and_fro(axis, share * (high - low)))
+        starts.push_back({{share * (high - low), target().typical_size()}});
     return starts;
   }
 
  private:
   std::string function() const override { return "lag behind a play"; }
+  /// Drawn along in one direction only, the lag is a function of the driver itself.
+  bool goes_to_and_fro(std::size_t axis, double width) const {
+    const std::vector<double>& driver = variable().value[axis];
+    const double half = 0.5 * width;
+    bool up = false, down = false;
+    double follower = driver.front();
+    for (const double value : driver) {
+      up |= value - half > follower;
+      down |= value + half < follower;
+      follower = std::clamp(follower, value - half, value + half);
+    }
+    return up && down;
+  }
   double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
     const std::vector<double>& driver = variable().value[axis];
     const double half = 0.5 * std::abs(p[0]);

@@ -102,6 +102,21 @@ TEST(DiagnosisStudy, WhatVariesIsOneFindingWithItsMean) {
   EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
+// Rounded twice, first to a third of the declared step: every code occurs, only the edges between
+// them are elsewhere, and from code to code that looks like a wave.
+TEST(DiagnosisStudy, AStepFinerThanTheDeclaredOneIsNoWave) {
+  const SetOutcome outcome = run_set({.seed = 900008,
+                                      .effects = {"adc.quantization"},
+                                      .size = 1,
+                                      .order = sim::RecordOrder::raster,
+                                      .bits = 12,
+                                      .static_s = 300});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_EQ(outcome.parameters_within, outcome.parameters) << outcome.found;
+}
+
 // In serpentine order the shorter way round is the only one; between fresh poses it is not, and the
 // simulated head goes the other.
 TEST(DiagnosisStudy, FreshPosesTellWhichWayRoundTheHeadGoes) {
