@@ -46,6 +46,14 @@ bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
   return false;
 }
 
+/// Whether readings say in which undeclared step they are and no more. What slow noise takes over
+/// an edge there, whole rings of poses, is no structure.
+bool is_nothing_but_steps(const VisitLog& log, std::size_t axis) {
+  constexpr double kSoftest = 0.25;  // of a step: with more noise there is a slope between edges
+  const auto& lattice = log.codes[axis].coarser_lattice;
+  return lattice && log.input_sd_V[axis] < kSoftest * lattice->step_V;
+}
+
 }  // namespace
 
 CandidateList all_candidates(const VisitLog& log,
@@ -66,6 +74,10 @@ CandidateList all_candidates(const VisitLog& log,
     list.owned.push_back(std::move(term));
     add_candidates(list, log, *list.owned.back(), kUnnamed);
   }
+  std::erase_if(list.candidates, [&](const Candidate& candidate) {
+    return candidate.handicap > 0 && candidate.effect->subject() == Subject::sensor &&
+           is_nothing_but_steps(log, candidate.axis);
+  });
   for (const auto& effect : own) {
     list.owned.push_back(effect);
     add_candidates(list, log, *effect);
