@@ -117,6 +117,18 @@ TEST(DiagnosisStudy, AStepFinerThanTheDeclaredOneIsNoWave) {
   EXPECT_EQ(outcome.parameters_within, outcome.parameters) << outcome.found;
 }
 
+// Whole rings of poses go over an edge of the step and back: that passed for a train of pulses.
+TEST(DiagnosisStudy, SlowNoiseAtTheEdgesOfACoarseStepIsNoStructure) {
+  const SetOutcome outcome = run_set({.seed = 900003,
+                                      .effects = {"adc.quantization"},
+                                      .size = 10,
+                                      .order = sim::RecordOrder::raster,
+                                      .static_s = 1800});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
 // In serpentine order the shorter way round is the only one; between fresh poses it is not, and the
 // simulated head goes the other.
 TEST(DiagnosisStudy, FreshPosesTellWhichWayRoundTheHeadGoes) {
