@@ -44,7 +44,10 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
   for (std::size_t c = 0; c < model.list().candidates.size(); ++c) {
     const Candidate& candidate = model.list().candidates[c];
     if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
-    if (candidate.effect != repeated.effect && model.is_chosen(candidate)) continue;
+    const bool is_replaced = std::any_of(instances.begin(), instances.end(), [&](std::size_t k) {
+      return model.candidate(k).effect == candidate.effect;
+    });
+    if (!is_replaced && model.is_chosen(candidate)) continue;
     tried = candidate.effect;
     CandidateList ones;
     for (const Hypothesis& hypothesis :

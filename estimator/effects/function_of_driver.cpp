@@ -269,6 +269,7 @@ class Pulses final : public FunctionOfDriver {
   }
   /// The longest of several waves is the fundamental.
   std::vector<Hypothesis> from_waves(const std::vector<std::vector<double>>& waves) const {
+    if (waves.size() < 2) return {};  // one alone is a wave
     std::vector<double> longest;
     for (const auto& wave : waves) {
       if (wave.size() != 4) return {};  // another shape

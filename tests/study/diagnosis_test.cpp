@@ -129,6 +129,19 @@ TEST(DiagnosisStudy, SlowNoiseAtTheEdgesOfACoarseStepIsNoStructure) {
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
+// A train that explains steps one by one may take the place of another train.
+TEST(DiagnosisStudy, WhatSwitchesRegularlyIsOneTrainNotSteps) {
+  const SetOutcome outcome = run_set({.seed = 760002,
+                                      .effects = {"own.compressor"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::examples,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 600});
+  expect_its_driver_and_no_listed_name(outcome);
+}
+
 // In serpentine order the shorter way round is the only one; between fresh poses it is not, and the
 // simulated head goes the other.
 TEST(DiagnosisStudy, FreshPosesTellWhichWayRoundTheHeadGoes) {
