@@ -36,10 +36,12 @@ class Quantization final : public Effect {
     return log.codes[axis].coarser_lattice.has_value();
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    // Of a finer step nothing is known: half the declared one has an edge in the middle between any
-    // two codes and changes nothing.
-    if (shows_finer_step(log, axis))
-      return {{{0.5 * log.adc->lsb_V(), log.adc->min_V, log.input_sd_V[axis]}}};
+    // Of a finer step nothing is known: half the declared one, with an edge at every edge between
+    // two codes, changes nothing.
+    if (shows_finer_step(log, axis)) {
+      const double declared_V = log.adc->lsb_V();
+      return {{{0.5 * declared_V, log.adc->min_V + 0.25 * declared_V, log.input_sd_V[axis]}}};
+    }
     // Without a declared converter the smallest difference between two readings is its step.
     const std::optional<Lattice> lattice =
         log.adc ? log.codes[axis].coarser_lattice
