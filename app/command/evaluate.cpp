@@ -82,8 +82,7 @@ void add_evaluate(CLI::App& program, Invocation& invocation) {
                 "Skip and count rows that cannot be used, instead of refusing the file");
   sub->footer(
       "Whether the head moved between the calibration run and the set is told from the readings; "
-      "so "
-      "is the way round it goes, where backlash was found and the run left that open. "
+      "so is the way round it goes, where backlash was found and the run left that open. "
       "Exit codes: 0 done, within the limits if [limits] were given; 1 done, limits exceeded on at "
       "least one pose; 2 wrong use; 4 internal error.");
   sub->callback(

@@ -31,10 +31,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     if (subset.size() == 1 && candidate.family == replaced.family &&
         candidate.hypothesis.p == replaced.hypothesis.p)
       continue;
-    if (model.is_chosen(candidate) &&
-        std::none_of(subset.begin(), subset.end(),
-                     [&](std::size_t k) { return model.candidate(k).effect == candidate.effect; }))
-      continue;
+    if (model.is_chosen_beside(subset, candidate)) continue;
     const EnlargedFit with = model.fit_with(without.parameters, candidate.active());
     if (!with.determined) continue;
     const double cost = with.chi2 + model.price(index);

@@ -36,32 +36,31 @@ std::vector<Candidate> likeliest(const SearchModel& model, const CandidateList& 
 bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instances,
                     const Candidate& repeated, const std::vector<std::vector<double>>& p,
                     double looks) {
-  const EnlargedFit without = model.fit_without(instances);
-  if (!without.determined) return false;
+  std::optional<EnlargedFit> without;  // most findings hint at nothing
   const Effect* tried = nullptr;
   std::optional<SearchModel::Entry> best;
   double best_cost = model.stage().fit.chi2 + model.price_of(instances);
   for (std::size_t c = 0; c < model.list().candidates.size(); ++c) {
     const Candidate& candidate = model.list().candidates[c];
     if (candidate.axis != repeated.axis || candidate.effect == tried) continue;
-    const bool is_replaced = std::any_of(instances.begin(), instances.end(), [&](std::size_t k) {
-      return model.candidate(k).effect == candidate.effect;
-    });
-    if (!is_replaced && model.is_chosen(candidate)) continue;
+    if (model.is_chosen_beside(instances, candidate)) continue;
     tried = candidate.effect;
     CandidateList ones;
     for (const Hypothesis& hypothesis :
          tried->in_one(model.input().log, candidate.axis, repeated.effect->id(), p))
       ones.candidates.push_back(
           {.effect = tried, .axis = candidate.axis, .hypothesis = hypothesis});
-    for (const Candidate& one : likeliest(model, ones, without)) {
+    if (ones.candidates.empty()) continue;
+    if (!without) without = model.fit_without(instances);
+    if (!without->determined) return false;
+    for (const Candidate& one : likeliest(model, ones, *without)) {
       const ActiveEffect active = one.active();
-      const EnlargedFit with = model.fit_with(without.parameters, active);
+      const EnlargedFit with = model.fit_with(without->parameters, active);
       const auto dof = static_cast<int>(active.free_count());
       const double cost = with.chi2 + model.price(c);
       if (!with.determined || cost >= best_cost) continue;
       const double p_value = p_of_search(
-          log_chi_squared_tail(without.chi2 - with.chi2, static_cast<double>(dof)), looks);
+          log_chi_squared_tail(without->chi2 - with.chi2, static_cast<double>(dof)), looks);
       if (p_value > model.options().false_alarm) continue;
       best_cost = cost;
       best = {c, p_value, with.parameters};

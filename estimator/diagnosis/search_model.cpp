@@ -160,6 +160,13 @@ bool SearchModel::is_chosen(const Candidate& candidate) const {
          });
 }
 
+bool SearchModel::is_chosen_beside(const std::vector<std::size_t>& effects,
+                                   const Candidate& candidate) const {
+  return is_chosen(candidate) && std::none_of(effects.begin(), effects.end(), [&](std::size_t k) {
+           return this->candidate(k).effect == candidate.effect;
+         });
+}
+
 void SearchModel::forget(std::size_t effect) {
   chosen_.erase(chosen_.begin() + static_cast<std::ptrdiff_t>(effect));
   p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(effect));

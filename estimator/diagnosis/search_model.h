@@ -30,6 +30,8 @@ class SearchModel {
   bool is_certain(const Candidate& candidate) const;
   /// An effect stands in the model once; a second pose, slip or step is another matter.
   bool is_chosen(const Candidate& candidate) const;
+  /// The same of the model without some of its effects.
+  bool is_chosen_beside(const std::vector<std::size_t>& effects, const Candidate& candidate) const;
   /// What proved superfluous once would come back and go again.
   bool is_dropped(const Candidate& candidate) const;
 

@@ -285,24 +285,26 @@ TEST(VisitLog, AnotherClockOrAnotherRecordHasNoHistory) {
   EXPECT_EQ(log.earlier, 0U);
 }
 
+const Effect& catalogued(const std::string& id) {
+  const auto all = effect_catalogue();
+  return **std::find_if(all.begin(), all.end(),
+                        [&](const Effect* effect) { return effect->id() == id; });
+}
+
 // To and fro between 0 and 330° both ways are the same; fresh poses are not.
 TEST(Backlash, TheWayIsThatOfTheDriveWhereItIsKnown) {
-  const auto all = effect_catalogue();
-  const auto backlash = *std::find_if(
-      all.begin(), all.end(), [](const Effect* effect) { return effect->id() == "rig.backlash"; });
+  const Effect& backlash = catalogued("rig.backlash");
   VisitLog log = example_log();
   for (const int way : {0, 1}) {
     log.goes_as_commanded = way == 1;
-    const auto hypotheses = backlash->hypotheses(log, 0);
+    const auto hypotheses = backlash.hypotheses(log, 0);
     ASSERT_FALSE(hypotheses.empty());
     for (const Hypothesis& hypothesis : hypotheses) EXPECT_EQ(hypothesis.p[1], way);
   }
 }
 
 TEST(Backlash, ARunThatNeverGoesTheLongWayLeavesOpenWhichWayItIs) {
-  const auto all = effect_catalogue();
-  const auto backlash = *std::find_if(
-      all.begin(), all.end(), [](const Effect* effect) { return effect->id() == "rig.backlash"; });
+  const Effect& backlash = catalogued("rig.backlash");
   const auto run_through = [](const std::vector<double>& delta_deg) {
     RunHistory run;
     for (const double delta : delta_deg) {
@@ -314,9 +316,9 @@ TEST(Backlash, ARunThatNeverGoesTheLongWayLeavesOpenWhichWayItIs) {
   // How it comes to the first pose of a set is open in any case.
   const std::vector<double> found = {0.1, 0, 0};
   const auto other_way = Contains(ElementsAre(0.1, 1, 0));
-  EXPECT_THAT(backlash->left_open_by(run_through({0, 120, 240, 120, 0}), found),
+  EXPECT_THAT(backlash.left_open_by(run_through({0, 120, 240, 120, 0}), found),
               AllOf(SizeIs(5), other_way));
-  EXPECT_THAT(backlash->left_open_by(run_through({0, 120, 240, 0, 120}), found),
+  EXPECT_THAT(backlash.left_open_by(run_through({0, 120, 240, 0, 120}), found),
               AllOf(SizeIs(2), Not(other_way)));
 }
 

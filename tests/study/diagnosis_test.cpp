@@ -102,6 +102,12 @@ TEST(DiagnosisStudy, WhatVariesIsOneFindingWithItsMean) {
   EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
+void expect_only_finding(const SetOutcome& outcome) {
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
 // Rounded twice, first to a third of the declared step: every code occurs, only the edges between
 // them are elsewhere, and from code to code that looks like a wave.
 TEST(DiagnosisStudy, AStepFinerThanTheDeclaredOneIsNoWave) {
@@ -111,9 +117,7 @@ TEST(DiagnosisStudy, AStepFinerThanTheDeclaredOneIsNoWave) {
                                       .order = sim::RecordOrder::raster,
                                       .bits = 12,
                                       .static_s = 300});
-  ASSERT_TRUE(outcome.feasible);
-  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  expect_only_finding(outcome);
   EXPECT_EQ(outcome.parameters_within, outcome.parameters) << outcome.found;
 }
 
@@ -124,9 +128,7 @@ TEST(DiagnosisStudy, SlowNoiseAtTheEdgesOfACoarseStepIsNoStructure) {
                                       .size = 10,
                                       .order = sim::RecordOrder::raster,
                                       .static_s = 1800});
-  ASSERT_TRUE(outcome.feasible);
-  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  expect_only_finding(outcome);
 }
 
 // A train that explains steps one by one may take the place of another train.
@@ -192,12 +194,6 @@ SetDesign coarse_in_slow_noise(std::uint64_t seed, const char* effect, sim::Reco
           .order = order,
           .noise = NoiseKind::coloured,
           .bits = 12};
-}
-
-void expect_only_finding(const SetOutcome& outcome) {
-  ASSERT_TRUE(outcome.feasible);
-  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
 // The gain has several peaks over the place of a step that few poses see.
