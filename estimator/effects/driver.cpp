@@ -74,15 +74,16 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; });
   add("delta_deg", [&](std::size_t k) { return visits[k].delta_rad; }).angle = true;
   add("h_deg", [&](std::size_t k) { return visits[k].h_rad; });
-  PerAxis<std::vector<double>> a_g, before_g;
+  PerAxis<std::vector<double>> a_g, change_g;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     a_g[i] = specific_force_component_g(log, i);
     for (std::size_t k = 0; k < a_g[i].size(); ++k)
-      before_g[i].push_back(a_g[i][log.before(k) ? k - 1 : k]);
+      change_g[i].push_back(log.before(k) ? a_g[i][k] - a_g[i][k - 1] : 0.0);
     drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g[i], a_g[i], a_g[i]}});
     drivers.back().in_the_twelve = true;
   }
-  drivers.push_back({"previous_pose", "a_i there", before_g});
+  // Nothing after a long rest, so that the 12 parameters are those of rest.
+  drivers.push_back({"previous_pose", "change of a_i since", change_g});
   add("previous_pose", [&](std::size_t k) {
     const Visit* before = log.before(k);
     return before ? std::remainder(visits[k].delta_rad - before->delta_rad, 2 * std::numbers::pi)

@@ -334,7 +334,7 @@ class Step final : public FunctionOfDriver {
     constexpr int kParts = 12;
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    for (const double share : {0.01, 0.04})
+    for (const double share : {0.01, 0.04, 0.13})
       for (int k = 1; k < kParts; ++k)
         starts.push_back(
             {{low + (high - low) * k / kParts, share * (high - low), target().typical_size()}});

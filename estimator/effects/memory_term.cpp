@@ -50,11 +50,14 @@ class Memory {
  public:
   Memory(DriverPointer driver, bool less_average, const VisitLog& log)
       : driver_(std::move(driver)),
-        name_(driver_->name + (less_average ? ".rate" : "")),
+        name_(driver_->name + (less_average && driver_->recorded ? ".rate" : "")),
         less_average_(less_average),
         log_(log) {}
 
   const std::string& name() const { return name_; }
+  /// Of an attitude, nothing when the head has long been at rest: the 12 parameters are those of
+  /// rest then.
+  bool vanishes_at_rest() const { return less_average_ && !driver_->recorded; }
   /// For the time constants that time_constants_s() lists, and by interpolation in between.
   double at(double tau_s, std::size_t axis, std::size_t visit) const {
     std::call_once(once_, [this] { make_table(); });
@@ -75,7 +78,9 @@ class Memory {
         const double value = at(tau_s, axis, k);
         range = {std::min(range.first, value), std::max(range.second, value)};
       }
-    return range;
+    if (!vanishes_at_rest()) return range;
+    const double most = std::max(-range.first, range.second);
+    return {-most, most};
   }
 
  private:
@@ -110,7 +115,9 @@ class MemoryTerm final : public SmoothTerm {
   const std::string& driver() const override { return memory_->name(); }
   TermForm form() const override { return target_.form; }
   std::string shape() const override {
-    return "straight line in the average of the past" + target_.words();
+    const char* argument = memory_->vanishes_at_rest() ? "the change from the average of the past"
+                                                       : "the average of the past";
+    return std::string("straight line in ") + argument + target_.words();
   }
   Subject subject() const override { return Subject::sensor; }
   bool remembers() const override { return true; }
@@ -156,7 +163,7 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
                                                       const DriverPointer& attitude,
                                                       const std::vector<DriverPointer>& columns) {
   std::vector<std::shared_ptr<const Memory>> memories = {
-      std::make_shared<const Memory>(attitude, false, log)};
+      std::make_shared<const Memory>(attitude, true, log)};
   for (const DriverPointer& column : columns)
     for (const bool less_average : {false, true})
       memories.push_back(std::make_shared<const Memory>(column, less_average, log));

@@ -330,7 +330,7 @@ TEST(AverageOfThePast, ForgetsWithinTheRunThatIsSearched) {
        {SmoothTermSelection::shown_by_these_visits, SmoothTermSelection::any}) {
     int seen = 0;
     for (const auto& term : smooth_terms(log, selection)) {
-      if (term->shape() != "straight line in the average of the past") continue;
+      if (!term->shape().ends_with("the average of the past")) continue;
       ++seen;
       ActiveEffect active = activate(*term, 0, term->hypotheses(log, 0).front());
       EXPECT_GT(largest_change(log, active), 0);
@@ -339,6 +339,29 @@ TEST(AverageOfThePast, ForgetsWithinTheRunThatIsSearched) {
     }
     EXPECT_GT(seen, 4);
   }
+}
+
+// Beside creep the 12 parameters are those of a long rest.
+TEST(AverageOfThePast, OfTheAttitudeIsNothingAfterALongRest) {
+  VisitLog log = example_log();
+  for (std::size_t k = 30; k < log.visits.size(); ++k) {
+    log.visits[k].delta_rad = log.visits[29].delta_rad;
+    log.visits[k].h_rad = log.visits[29].h_rad;
+  }
+  int seen = 0;
+  for (const auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
+    if (term->shape() != "straight line in the change from the average of the past") continue;
+    ++seen;
+    EXPECT_EQ(term->driver(), "previous_pose");
+    EnlargedParameters with = twelve();
+    with.effects = {activate(*term, 0, term->hypotheses(log, 0).front())};
+    ASSERT_EQ(with.effects[0].p[4], 0) << "no other beginning";
+    const Eigen::VectorXd change =
+        predict_means_V(log, with)[0] - predict_means_V(log, twelve())[0];
+    EXPECT_LT(change.tail(1).cwiseAbs().maxCoeff(), 0.01 * change.cwiseAbs().maxCoeff());
+    EXPECT_GT(change.head(30).cwiseAbs().maxCoeff(), 0);
+  }
+  EXPECT_EQ(seen, 2);  // bias and scale
 }
 
 TEST(LegendreSeries, GoesStraightOnBeyondTheRange) {
