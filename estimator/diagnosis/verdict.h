@@ -7,12 +7,12 @@ namespace plumbline {
 
 /// One axis as the verdict sees it.
 struct AxisVerdictInput {
-  bool noise_known = false;  ///< some noise was identified
-  bool responds = false;     ///< the scale factor differs from zero
-  double p_value = 1;        ///< of the residual test
-  double rms_mps2 = 0;       ///< residual of the pose means
-  double expected_mps2 = 0;  ///< what the identified noise would leave
-  double u_expected_mps2 = 0;
+  bool noise_known = false;    ///< some noise was identified
+  bool responds = false;       ///< the scale factor differs from zero
+  double p_value = 1;          ///< of the residual test
+  double rms_mps2 = 0;         ///< residual of the pose means
+  double expected_mps2 = 0;    ///< what the identified noise would leave
+  double u_expected_mps2 = 0;  ///< by chance, and as the noise is known only so well
 };
 
 struct VerdictInput {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 #include "estimator/noise/longest_stretch.h"
 #include "tests/estimator/synthetic_run.h"
@@ -48,6 +50,19 @@ TEST(Calibrate, FindsTheUnitAndItsNoise) {
     EXPECT_EQ(result.after.fit_pose_rms_mps2[axis], result.before.fit_pose_rms_mps2[axis]);
   }
   EXPECT_EQ(result.decision.status, DecisionStatus::none);
+}
+
+// White noise on 60 poses: their RMS scatters by 1/√(2·56).
+TEST(Calibrate, SaysHowFarChanceTakesTheResidual) {
+  const std::string reason = calibrated(synthetic_run(1, kSixteenBits)).diagnosis.reason;
+  double residual = 0, expected = 0, u = 0;
+  const std::size_t at = reason.find("x axis: ");
+  ASSERT_NE(at, std::string::npos) << reason;
+  ASSERT_EQ(std::sscanf(reason.c_str() + at, "x axis: residual %lf m/s² where %lf ± %lf", &residual,
+                        &expected, &u),
+            3)
+      << reason;
+  EXPECT_NEAR(u / expected, 1 / std::sqrt(2.0 * 56), 0.03);
 }
 
 TEST(Calibrate, FollowsTheEstimateFromPoseToPose) {
