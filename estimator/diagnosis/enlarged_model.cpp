@@ -393,8 +393,8 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
 }
 
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
-                         const PoseWhitening& whitening, const EnlargedParameters& start) {
-  constexpr int kMaxIterations = 20;
+                         const PoseWhitening& whitening, const EnlargedParameters& start,
+                         int most_iterations) {
   constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
   const Eigen::Index rows =
       has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
@@ -406,7 +406,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   fit.parameters = start;
   fit.whitened_residual = whitened_residual(start);
   fit.chi2 = fit.whitened_residual.squaredNorm();
-  for (int iteration = 0; iteration < kMaxIterations && !fit.converged; ++iteration) {
+  for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
     fit.whitened_jacobian = whitening.apply(prediction_jacobian(log, fit.parameters));
     const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
     fit.determined = norms.minCoeff() > 0;

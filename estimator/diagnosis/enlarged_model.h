@@ -130,7 +130,8 @@ struct EnlargedFit : EnlargedEstimate {
 /// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
 /// factorisation).
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
-                         const PoseWhitening& whitening, const EnlargedParameters& start);
+                         const PoseWhitening& whitening, const EnlargedParameters& start,
+                         int most_iterations = 20);
 
 /// The same; where that leaves something undetermined, the shapes of the effects from `first_new`
 /// on stay where they ended up: a boundary between two readings, say, that the visits do not place.

@@ -179,11 +179,26 @@ void SearchModel::look_closer() {
   const std::vector<Hypothesis> closer =
       newcomer.effect->closer(input_.log, newcomer.axis, {newcomer.p});
   std::vector<EnlargedFit> fits(closer.size());
-  parallel_for(fits.size(), [&](std::size_t k) {
-    EnlargedParameters model = stage_.fit.parameters;
-    model.effects.back().p = closer[k].p;
-    fits[k] = fit(model);
-  });
+  const auto fit_all = [&](int most_iterations) {
+    parallel_for(fits.size(), [&](std::size_t k) {
+      fits[k] = fit_enlarged(input_.log, stage_.observed, stage_.whitening, fits[k].parameters,
+                             most_iterations);
+    });
+  };
+  for (std::size_t k = 0; k < closer.size(); ++k) {
+    fits[k].parameters = stage_.fit.parameters;
+    fits[k].parameters.effects.back().p = closer[k].p;
+  }
+  // Of many, the best few are known before they have settled.
+  constexpr std::size_t kFew = 8;
+  if (fits.size() > kFew) {
+    fit_all(2);
+    std::erase_if(fits, [](const EnlargedFit& with) { return !with.determined; });
+    std::stable_sort(fits.begin(), fits.end(),
+                     [](const EnlargedFit& a, const EnlargedFit& b) { return a.chi2 < b.chi2; });
+    fits.resize(std::min(fits.size(), kFew));
+  }
+  fit_all(20);
   const EnlargedFit* best = nullptr;
   for (const EnlargedFit& with : fits)
     if (with.determined && with.chi2 < stage_.fit.chi2 - kClearly &&

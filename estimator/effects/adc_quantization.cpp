@@ -130,10 +130,12 @@ class Quantization final : public Effect {
     const Adc& adc = *input.log.adc;
     const double declared_V = adc.lsb_V(), value_V = input.output_V;
     const double sd_V = std::clamp(p[2], kLeastOfStep * declared_V, declared_V);
-    const double reach_V = effect::kReach * sd_V + p[0] + declared_V;
-    const double first = std::floor((value_V - reach_V - adc.min_V) / declared_V);
+    // Beyond, both edges are on the same side of all noise.
+    const double reach_V = effect::kReach * sd_V + 0.5 * p[0];
+    const double first = std::ceil((value_V - reach_V - adc.min_V) / declared_V - 0.5);
+    const double last = std::floor((value_V + reach_V - adc.min_V) / declared_V - 0.5);
     double more_V = 0, slope = 0;
-    const auto codes = static_cast<int>(std::ceil(2 * reach_V / declared_V)) + 1;
+    const auto codes = static_cast<int>(last - first) + 1;
     for (int k = 0; k < codes; ++k) {
       const double edge_V = adc.min_V + declared_V * (first + k + 0.5);
       const double finer_V = p[1] + p[0] * (std::floor((edge_V - p[1]) / p[0]) + 0.5);
