@@ -17,6 +17,12 @@
 // and of whose predecessor the record says nothing. What evaluate() makes of the fresh poses as a
 // file of their own stands beside it.
 //
+// Told: someone who knows which effect there is, and the true covariance, and estimates its
+// parameters together with the 12 from the same readings: by the estimator's model of the effect
+// from the true values on; where an effect is on no list, its amplitude, the response being known.
+// What the error after exceeds this by, the search has cost; what this exceeds the oracle by, the
+// readings do not tell.
+//
 // Effects outside the list: what counts as the right driver stands in diagnosis_own.cpp.
 #pragma once
 
@@ -109,6 +115,8 @@ struct StudySet {
   bool feasible = true;       ///< every effect could be scaled to the size
 };
 StudySet make_set(const SetDesign& design);
+/// Run and verification as that world would give them without noise and rounding.
+sim::RecordedSet record_without_noise(const SetDesign& design, const sim::World& world);
 
 // --- how it is scored ----------------------------------------------------------------------------
 
@@ -152,6 +160,7 @@ struct SetOutcome : Claims {
 
   Errors before, after, oracle;
   double plain_oracle_fresh = 0;  ///< ordinary least squares without the effect
+  double told_fresh = 0;          ///< of one who is told which effect there is
   double evaluated_fresh = 0;     ///< evaluate() on the fresh poses as a file of their own
   double seconds = 0;             ///< of calibrate()
 
@@ -164,6 +173,15 @@ SetOutcome run_set(const SetDesign& design);
 SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration& calibration);
 /// A diagnosis held against the truth.
 Claims check_claims(const SetDesign& design, const StudySet& set, const Diagnosis& diagnosis);
+/// The 12 parameters in the estimator's convention: columns act about their mean over the run.
+PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set);
+/// Fills the oracle's errors.
+void score_oracle(const StudySet& set, SetOutcome& outcome);
+/// Error on the fresh poses of one who is told the effects, m/s²; NaN where the estimator does not
+/// consider a listed one with these readings.
+double told_fresh_mps2(const SetDesign& design, const StudySet& set);
+/// Root mean square over the fresh poses that count, which are the last of `all` poses.
+double fresh_rms(const StudySet& set, const Eigen::VectorXd& all);
 /// Root mean square over the axes.
 double over_axes(const PerAxis<double>& rms_mps2);
 /// The fresh poses appended to the run: one record on one clock.

@@ -109,6 +109,7 @@ const std::vector<Column>& columns() {
       number("oracle_fresh_mps2", "{:.6f}", [](auto& o) { return std::ref(o.oracle.fresh); }),
       number("ordinary_oracle_fresh_mps2", "{:.6f}",
              [](auto& o) { return std::ref(o.plain_oracle_fresh); }),
+      number("told_fresh_mps2", "{:.6f}", [](auto& o) { return std::ref(o.told_fresh); }),
       number("evaluated_fresh_mps2", "{:.6f}", [](auto& o) { return std::ref(o.evaluated_fresh); }),
       number("before_heldout_mps2", "{:.6f}", [](auto& o) { return std::ref(o.before.heldout); }),
       number("after_heldout_mps2", "{:.6f}", [](auto& o) { return std::ref(o.after.heldout); }),

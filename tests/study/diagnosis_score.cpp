@@ -158,43 +158,6 @@ void check_parameters(const std::vector<sim::EffectSetting>& truth, const Diagno
   }
 }
 
-/// Mean of a recorded column over the run, which the estimator refers a column's effect to.
-double column_mean(const SampleTable& samples, const std::string& column) {
-  for (const Covariate& covariate : samples.covariates) {
-    if (covariate.name != column) continue;
-    double sum = 0;
-    for (const double value : covariate.value) sum += value;
-    return sum / static_cast<double>(covariate.value.size());
-  }
-  return 0;
-}
-
-/// The 12 parameters in the estimator's convention: columns act about their mean over the run.
-PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
-  PerAxis<Eigen::Vector4d> truth;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const auto& K = set.world.triad.K_V_per_g[i];
-    truth[i] << K[0], K[1], K[2], set.world.triad.U0_V[i];
-  }
-  const sim::Room& room = set.world.room;
-  const std::map<std::string, double> nominal = {{"rh_pct", room.rh_pct},
-                                                 {"supply_V", room.supply_V},
-                                                 {"motor_A", room.hold_A + room.lift_A / 2}};
-  for (const sim::EffectSetting& effect : set.effects) {
-    if (!effect.id.starts_with("covariate:")) continue;
-    const std::string column = effect.id.substr(effect.id.find(':') + 1);
-    const auto found = nominal.find(column);
-    if (found == nominal.end()) continue;
-    const double shift =
-        effect.parameters.at("c") * (column_mean(set.set.run.samples, column) - found->second);
-    for (const std::size_t i : effect.axes) {
-      const auto own = static_cast<Eigen::Index>(i);
-      truth[i](effect.form == "scale" ? own : 3) += shift * set.world.triad.K_V_per_g[i][i];
-    }
-  }
-  return truth;
-}
-
 void check_twelve(const StudySet& set, const Calibration& calibration, SetOutcome& outcome) {
   const PerAxis<Eigen::Vector4d> truth = true_twelve(set);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -207,37 +170,6 @@ void check_twelve(const StudySet& set, const Calibration& calibration, SetOutcom
       worst = std::max(worst, z);
     }
   }
-}
-
-/// Root mean square over the fresh poses that count, which are the last of `all` poses.
-double fresh_rms(const StudySet& set, const Eigen::VectorXd& all) {
-  return rms(all.tail(std::ssize(set.set.verification.poses) - 1));
-}
-
-void score_oracle(const StudySet& set, SetOutcome& outcome) {
-  const auto poses = pose_means(set.plain.run);
-  const auto fresh = pose_means(set.plain.verification);
-  const Eigen::MatrixXd A = design_matrix(poses, set.plain.description.gravity);
-  const Eigen::MatrixXd A_fresh = design_matrix(fresh, set.plain.description.gravity);
-  PerAxis<double> fresh_mps2{};
-  PerAxis<double> heldout_mps2{};
-  PerAxis<double> ordinary_mps2{};
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const Eigen::VectorXd y = mean_voltages(poses, i);
-    const auto fit = fit_generalised(A, y, set.covariance_V2[i]);
-    assert(fit);
-    const double factor = input_referred_mps2_per_V(fit->estimate, i);
-    const Eigen::VectorXd y_fresh = mean_voltages(fresh, i);
-    fresh_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * fit->estimate.value));
-    const Eigen::VectorXd ordinary = solve_least_squares(A, y).x;
-    ordinary_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * ordinary));
-    Eigen::VectorXd heldout(2 * y.size());
-    heldout << heldout_residuals_V(A, y, set.covariance_V2[i], time_blocks(poses)),
-        heldout_residuals_V(A, y, set.covariance_V2[i], position_blocks(poses));
-    heldout_mps2[i] = rms(factor * heldout);
-  }
-  outcome.oracle = {over_axes(fresh_mps2), over_axes(heldout_mps2)};
-  outcome.plain_oracle_fresh = over_axes(ordinary_mps2);
 }
 
 /// Errors of the 12 parameters and of the certified model on the fresh poses of the session.
@@ -344,6 +276,7 @@ SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration
   check_parameters(set.effects, calibration.diagnosis, outcome);
   check_twelve(set, calibration, outcome);
   score_oracle(set, outcome);
+  outcome.told_fresh = told_fresh_mps2(design, set);
 
   const CertifiedModel model = certified_model(calibration);
   outcome.before.heldout = over_axes(calibration.before.heldout_pose_rms_mps2);

@@ -248,17 +248,20 @@ struct ScaledEffect {
   bool feasible = false;
 };
 
+/// Nothing but the unit, the head and their effects.
+sim::World without_noise(sim::World world) {
+  world.noise_V = {};
+  world.adc.bits = 24;
+  return world;
+}
+
 /// Scales one effect to the size.
 ScaledEffect scale_to_size(const Template& shape, const SetDesign& design, const sim::World& world,
                            const Yardstick& yard, const PerAxis<Eigen::MatrixXd>& V) {
   ScaledEffect result;
   const std::string& id = shape.setting.id;
   const bool converter = id.starts_with("adc.") && id != "adc.mains_pickup";
-  sim::World quiet = world;
-  if (!converter) {
-    quiet.noise_V = {};
-    quiet.adc.bits = 24;
-  }
+  sim::World quiet = converter ? world : without_noise(world);
   sim::RecordOptions options = record_options(design);
   options.verification_poses = 0;
   const MeasurementSet without = sim::record_set(quiet, options).run;
@@ -397,6 +400,10 @@ StudySet make_set(const SetDesign& design) {
   });
   result.static_record = sim::record_set(other_day, still).soak;
   return result;
+}
+
+sim::RecordedSet record_without_noise(const SetDesign& design, const sim::World& world) {
+  return sim::record_set(without_noise(world), record_options(design));
 }
 
 Result<void> dump(const StudySet& set, const std::string& folder) {

@@ -87,7 +87,7 @@ struct Score {
 struct Tally {
   Score ours, naive;
   Share coverage, K, U0, unexplained, worse;
-  std::vector<double> heldout, evaluated, seconds;
+  std::vector<double> heldout, evaluated, told, after_told, seconds;
   std::map<std::string, int> claims;  ///< how often what was reported, for effects outside the list
   int sets = 0, infeasible = 0, undetectable = 0;
 
@@ -105,6 +105,10 @@ struct Tally {
     seconds.push_back(o.seconds);
     heldout.push_back(o.after.heldout / o.oracle.heldout);
     evaluated.push_back(o.evaluated_fresh / o.oracle.fresh);
+    if (std::isfinite(o.told_fresh)) {
+      told.push_back(o.told_fresh / o.oracle.fresh);
+      after_told.push_back(o.after.fresh / o.told_fresh);
+    }
     coverage.k += o.parameters_within;
     coverage.n += o.parameters;
     K.k += o.K_within;
@@ -215,6 +219,10 @@ std::string totals(const Tally& all, double detectable_sigma) {
   errors("error after / oracle: fresh poses", all.ours.fresh);
   errors("  left-out poses", all.heldout);
   errors("  fresh poses as a file of their own (evaluate)", all.evaluated);
+  if (!all.told.empty()) {
+    errors("  fresh poses, told the effect / oracle", all.told);
+    errors("  fresh poses, error after / told the effect", all.after_told);
+  }
   errors("  fresh poses, naive", all.naive.fresh);
   text += fmt::format("calibrate(): median {:.2f} s, longest {:.2f} s\n",
                       quantile(all.seconds, 0.5), quantile(all.seconds, 1));

@@ -263,6 +263,39 @@ TEST(DiagnosisStudy, APlayInStrongSlowNoiseIsFoundBesideAxesWithMoreNoise) {
   expect_driver_and_error_of_the_oracle(in_strong_slow_noise("own.thermal_hysteresis"));
 }
 
+// 93 % of the response creep: a sensitivity of what is left at once would make little errors large.
+TEST(DiagnosisStudy, BesideCreepTheSensitivityIsThatOfRest) {
+  expect_driver_and_error_of_the_oracle(in_strong_slow_noise("own.creep"));
+}
+
+// Between a step and a bend, which went on beyond the range that was seen.
+TEST(DiagnosisStudy, AWideStepIsNoBend) {
+  const SetOutcome outcome = run_set({.seed = 760004,
+                                      .effects = {"own.condensation"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::examples,
+                                      .bits = 12,
+                                      .samples_per_pose = 50,
+                                      .static_s = 1800});
+  expect_driver_and_error_of_the_oracle(outcome);
+}
+
+// From neighbouring poses settling is told less well than poses anywhere need it, whoever tells.
+TEST(DiagnosisStudy, WhoIsToldTheEffectErrsAsMuch) {
+  const SetOutcome outcome = run_set({.seed = 740001,
+                                      .effects = {"sensor.settling"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::examples,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 600});
+  expect_only_finding(outcome);
+  EXPECT_GT(outcome.told_fresh, 1.5 * outcome.oracle.fresh);
+  EXPECT_LT(outcome.after.fresh, 1.05 * outcome.told_fresh);
+}
+
 // A drift looks better as long as the noise is the one that had to take up the creep.
 TEST(DiagnosisStudy, CreepInSlowNoiseIsNotTakenForADrift) {
   const SetOutcome outcome = run_set({.seed = 760002,

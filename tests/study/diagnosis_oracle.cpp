@@ -1,0 +1,228 @@
+// What those who know more than the engine would reach: the oracle, whose readings hold no effect,
+// and someone who is told which effect there is.
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/effects/catalogue.h"
+#include "estimator/effects/covariate.h"
+#include "estimator/error_figures.h"
+#include "estimator/fit/generalised_fit.h"
+#include "estimator/fit/least_squares.h"
+#include "estimator/pose_means.h"
+#include "tests/study/diagnosis.h"
+
+namespace plumbline::study {
+namespace {
+
+/// Mean of a recorded column over the run, which the estimator refers a column's effect to.
+double column_mean(const SampleTable& samples, const std::string& column) {
+  for (const Covariate& covariate : samples.covariates) {
+    if (covariate.name != column) continue;
+    double sum = 0;
+    for (const double value : covariate.value) sum += value;
+    return sum / static_cast<double>(covariate.value.size());
+  }
+  return 0;
+}
+
+/// The effect of the estimator that a simulated one is.
+const Effect* counterpart(const sim::EffectSetting& truth,
+                          const std::vector<std::unique_ptr<Effect>>& of_columns) {
+  for (const Effect* effect : effect_catalogue())
+    if (effect->id() == truth.id) return effect;
+  for (const auto& effect : of_columns) {
+    const bool bias = effect->parameters().front().unit.starts_with("g");
+    if (effect->id() == truth.id && (truth.form == "bias") == bias) return effect.get();
+  }
+  return nullptr;
+}
+
+/// The effect with its true values; what only the estimator's model of it has stands as where a
+/// search would start, one of these after the other.
+std::vector<ActiveEffect> true_effects(const Effect& effect, const sim::EffectSetting& truth,
+                                       const VisitLog& log) {
+  const std::size_t axis = effect.subject() == Subject::head ? 0 : truth.axes.front();
+  const auto infos = effect.parameters();
+  std::vector<ActiveEffect> all;
+  for (Hypothesis& hypothesis : effect.hypotheses(log, axis)) {
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      const auto value = truth.parameters.find(infos[k].name);
+      if (value != truth.parameters.end()) hypothesis.p[k] = value->second;
+      if (infos[k].name == "poses") hypothesis.p[k] = static_cast<double>(truth.poses.front());
+    }
+    const bool known = std::any_of(all.begin(), all.end(), [&](const ActiveEffect& active) {
+      return active.p == hypothesis.p;
+    });
+    if (!known) all.push_back(activate(effect, axis, hypothesis));
+  }
+  return all;
+}
+
+/// The true covariance; the contrasts of the dwells scatter as without the effect.
+PoseWhitening true_whitening(const StudySet& set, const VisitLog& log) {
+  PoseWhitening whitening;
+  const Observations plain = observe(set.plain.run, log);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    whitening.set(i, set.covariance_V2[i]);
+    const Eigen::MatrixXd& dwell_V = plain.dwell_V[i];
+    whitening.dwell_sd_V[i] =
+        (dwell_V.colwise().squaredNorm() / static_cast<double>(dwell_V.rows())).cwiseSqrt();
+  }
+  return whitening;
+}
+
+}  // namespace
+
+PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
+  PerAxis<Eigen::Vector4d> truth;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto& K = set.world.triad.K_V_per_g[i];
+    truth[i] << K[0], K[1], K[2], set.world.triad.U0_V[i];
+  }
+  const sim::Room& room = set.world.room;
+  const std::map<std::string, double> nominal = {{"rh_pct", room.rh_pct},
+                                                 {"supply_V", room.supply_V},
+                                                 {"motor_A", room.hold_A + room.lift_A / 2}};
+  for (const sim::EffectSetting& effect : set.effects) {
+    if (!effect.id.starts_with("covariate:")) continue;
+    const std::string column = effect.id.substr(effect.id.find(':') + 1);
+    const auto found = nominal.find(column);
+    if (found == nominal.end()) continue;
+    const double shift =
+        effect.parameters.at("c") * (column_mean(set.set.run.samples, column) - found->second);
+    for (const std::size_t i : effect.axes) {
+      const auto own = static_cast<Eigen::Index>(i);
+      truth[i](effect.form == "scale" ? own : 3) += shift * set.world.triad.K_V_per_g[i][i];
+    }
+  }
+  return truth;
+}
+
+double fresh_rms(const StudySet& set, const Eigen::VectorXd& all) {
+  return rms(all.tail(std::ssize(set.set.verification.poses) - 1));
+}
+
+void score_oracle(const StudySet& set, SetOutcome& outcome) {
+  const auto poses = pose_means(set.plain.run);
+  const auto fresh = pose_means(set.plain.verification);
+  const Eigen::MatrixXd A = design_matrix(poses, set.plain.description.gravity);
+  const Eigen::MatrixXd A_fresh = design_matrix(fresh, set.plain.description.gravity);
+  PerAxis<double> fresh_mps2{};
+  PerAxis<double> heldout_mps2{};
+  PerAxis<double> ordinary_mps2{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const Eigen::VectorXd y = mean_voltages(poses, i);
+    const auto fit = fit_generalised(A, y, set.covariance_V2[i]);
+    assert(fit);
+    const double factor = input_referred_mps2_per_V(fit->estimate, i);
+    const Eigen::VectorXd y_fresh = mean_voltages(fresh, i);
+    fresh_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * fit->estimate.value));
+    const Eigen::VectorXd ordinary = solve_least_squares(A, y).x;
+    ordinary_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * ordinary));
+    Eigen::VectorXd heldout(2 * y.size());
+    heldout << heldout_residuals_V(A, y, set.covariance_V2[i], time_blocks(poses)),
+        heldout_residuals_V(A, y, set.covariance_V2[i], position_blocks(poses));
+    heldout_mps2[i] = rms(factor * heldout);
+  }
+  outcome.oracle = {over_axes(fresh_mps2), over_axes(heldout_mps2)};
+  outcome.plain_oracle_fresh = over_axes(ordinary_mps2);
+}
+
+namespace {
+
+/// By the estimator's models of the effects.
+double told_listed_mps2(const StudySet& set) {
+  const VisitLog log = make_visit_log(set.set.run, set.set.description);
+  const Observations observed = observe(set.set.run, log);
+  const PoseWhitening whitening = true_whitening(set, log);
+  const auto of_columns = covariate_effects(log);
+  EnlargedFit told;
+  told.parameters.twelve = true_twelve(set);
+  if (set.effects.empty()) told = fit_enlarged(log, observed, whitening, told.parameters);
+  for (const sim::EffectSetting& truth : set.effects) {
+    const Effect* effect = counterpart(truth, of_columns);
+    assert(effect != nullptr);
+    EnlargedFit best;
+    best.chi2 = std::numeric_limits<double>::infinity();
+    for (const ActiveEffect& active : true_effects(*effect, truth, log)) {
+      EnlargedFit fit =
+          fit_holding_shapes(log, observed, whitening, with_effect(told.parameters, active), 0);
+      if (fit.chi2 < best.chi2) best = std::move(fit);
+    }
+    if (best.parameters.effects.empty()) return std::numeric_limits<double>::quiet_NaN();
+    told = std::move(best);
+  }
+  std::erase_if(told.parameters.effects,
+                [](const ActiveEffect& active) { return !active.effect->carries_over(); });
+
+  const MeasurementSet all = session(set);
+  const auto poses = pose_means(all);
+  const auto predicted_V =
+      predict_means_V(make_visit_log(all, set.set.description), told.parameters);
+  PerAxis<double> mps2{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisEstimate twelve{told.parameters.twelve[i], Eigen::Matrix4d::Zero()};
+    mps2[i] = fresh_rms(
+        set, input_referred_mps2_per_V(twelve, i) * (mean_voltages(poses, i) - predicted_V[i]));
+  }
+  return over_axes(mps2);
+}
+
+/// What the effects of the world do to the pose means, V.
+PerAxis<Eigen::VectorXd> change_V(const MeasurementSet& with, const MeasurementSet& without) {
+  const auto changed = pose_means(with);
+  const auto plain = pose_means(without);
+  PerAxis<Eigen::VectorXd> change;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    change[i] = mean_voltages(changed, i) - mean_voltages(plain, i);
+  return change;
+}
+
+/// By what the effects do, of which the amplitude is estimated.
+double told_response_mps2(const SetDesign& design, const StudySet& set) {
+  sim::World plain = set.world;
+  plain.effects.clear();
+  const sim::RecordedSet with = record_without_noise(design, set.world);
+  const sim::RecordedSet without = record_without_noise(design, plain);
+  const auto run_V = change_V(with.run, without.run);
+  const auto fresh_V = change_V(with.verification, without.verification);
+  const auto poses = pose_means(set.set.run);
+  const auto fresh = pose_means(set.set.verification);
+  const Eigen::MatrixXd A = design_matrix(poses, set.set.description.gravity);
+  const Eigen::MatrixXd A_fresh = design_matrix(fresh, set.set.description.gravity);
+
+  const Eigen::Index n = A.rows();
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(3 * n, 13);
+  Eigen::VectorXd y(3 * n);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    const Eigen::LLT<Eigen::MatrixXd> factor(set.covariance_V2[i]);
+    columns.block(axis * n, 4 * axis, n, 4) = factor.matrixL().solve(A);
+    columns.block(axis * n, 12, n, 1) = factor.matrixL().solve(run_V[i]);
+    y.segment(axis * n, n) = factor.matrixL().solve(mean_voltages(poses, i));
+  }
+  const Eigen::VectorXd told = solve_least_squares(columns, y).x;
+
+  PerAxis<double> mps2{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisEstimate twelve{told.segment<4>(4 * static_cast<Eigen::Index>(i)),
+                              Eigen::Matrix4d::Zero()};
+    mps2[i] = fresh_rms(
+        set, input_referred_mps2_per_V(twelve, i) *
+                 (mean_voltages(fresh, i) - A_fresh * twelve.value - told(12) * fresh_V[i]));
+  }
+  return over_axes(mps2);
+}
+
+}  // namespace
+
+double told_fresh_mps2(const SetDesign& design, const StudySet& set) {
+  return kind_of(design) == SetKind::own ? told_response_mps2(design, set) : told_listed_mps2(set);
+}
+
+}  // namespace plumbline::study
