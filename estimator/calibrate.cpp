@@ -284,14 +284,6 @@ void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_pe
       std::abs(mps2_per_V) * std::sqrt(std::max(variance, 0.0)) / (2.0 * std::sqrt(mean_square));
 }
 
-/// How far chance takes the pose RMS of one run from what is expected: slow noise has few degrees of
-/// freedom.
-double scatter_of_rms(const GeneralisedFit& fit, double mps2_per_V) {
-  const Eigen::MatrixXd& V = fit.residual_covariance_V2;
-  return std::abs(mps2_per_V) * V.norm() /
-         std::sqrt(2.0 * V.trace() * static_cast<double>(V.rows()));
-}
-
 /// Errors of one axis; returns the held-out errors of both partitions one after the other.
 Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work, std::size_t axis,
                               double mps2_per_V, ErrorFigures& errors) {
@@ -371,13 +363,14 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
     const Eigen::VectorXd heldout = error_figures(experiment, w, axis, mps2_per_V, result.before);
     floor_of(experiment, w, mps2_per_V, result.floor_pose_rms_mps2[axis],
              result.u_floor_pose_rms_mps2[axis]);
-    verdict.axis[axis] = {w.noise_known,
-                          std::isfinite(mps2_per_V),
-                          w.test.p_value,
-                          result.before.fit_pose_rms_mps2[axis],
-                          result.floor_pose_rms_mps2[axis],
-                          std::hypot(result.u_floor_pose_rms_mps2[axis],
-                                     scatter_of_rms(w.fit, mps2_per_V))};
+    verdict.axis[axis] = {
+        w.noise_known,
+        std::isfinite(mps2_per_V),
+        w.test.p_value,
+        result.before.fit_pose_rms_mps2[axis],
+        result.floor_pose_rms_mps2[axis],
+        std::hypot(result.u_floor_pose_rms_mps2[axis],
+                   std::abs(mps2_per_V) * scatter_of_rms_V(w.fit.residual_covariance_V2))};
 
     // An axis whose residual the noise does not explain is less certain than the noise says.
     const bool unexplained = is_unexplained(verdict, axis);

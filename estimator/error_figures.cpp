@@ -92,4 +92,9 @@ double expected_mean_square_V2(const Eigen::MatrixXd& A, const Eigen::MatrixXd& 
   return std::max(trace, 0.0) / static_cast<double>(V.rows());
 }
 
+double scatter_of_rms_V(const Eigen::MatrixXd& S) {
+  const double trace = S.trace();
+  return trace > 0 ? S.norm() / std::sqrt(2 * trace * static_cast<double>(S.rows())) : 0;
+}
+
 }  // namespace plumbline

@@ -38,4 +38,9 @@ double sample_rms_V(const MeasurementSet& set, const Eigen::VectorXd& predicted_
 double expected_mean_square_V2(const Eigen::MatrixXd& A, const Eigen::MatrixXd& gain,
                                const Eigen::MatrixXd& V);
 
+/// How far chance takes the root mean square of one run's residuals from the expected one, to first
+/// order: slow noise has few degrees of freedom. S: n × n, what the noise leaves after the fit, V²;
+/// V: ‖S‖/√(2·n·trace(S)), Gaussian residuals.
+double scatter_of_rms_V(const Eigen::MatrixXd& S);
+
 }  // namespace plumbline

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/heldout.h"
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/separation.h"
+#include "estimator/diagnosis/verdict.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
@@ -221,6 +224,10 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     filter.parameters.set_free_values(joint->value);
     attach_filter(log, filter, diagnosis);
   }
+  PerAxis<bool> concerned{};
+  for (const ActiveEffect& active : found.fit.parameters.effects)
+    for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
+  std::string residual_words, after_words;
   WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -246,6 +253,20 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
       result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
     }
     result.floor_pose_rms_mps2[i] = floor_mps2;
+    if (concerned[i]) {
+      const double by_chance_V = scatter_of_rms_V(found.noise[i].covariance -
+                                                  block * under_this_noise * block.transpose());
+      AxisVerdictInput words;
+      words.rms_mps2 = result.before.fit_pose_rms_mps2[i];
+      words.expected_mps2 = floor_mps2;
+      words.u_expected_mps2 =
+          std::hypot(result.u_floor_pose_rms_mps2[i], std::abs(factor) * by_chance_V);
+      residual_words += (residual_words.empty() ? "" : "; ") + compare_with_expected(words, i);
+      char text[40];
+      std::snprintf(text, sizeof text, "%s axis %.3g m/s²", kAxisName[i],
+                    result.after.fit_pose_rms_mps2[i]);
+      after_words += (after_words.empty() ? "; after: " : ", ") + std::string(text);
+    }
     result.after.heldout_pose_rms_mps2[i] = rms(heldout_errors_mps2[i]);
     result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout_errors_mps2[i]);
     result.after.sample_rms_mps2[i] =
@@ -265,10 +286,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     diagnosis.verdict = Verdict::partly_explained;
   }
   diagnosis.axis_test = result.diagnosis.axis_test;
-  // How large the residual was, then what it comes from.
-  if (result.diagnosis.verdict == Verdict::unexplained) {
-    diagnosis.reason = result.diagnosis.reason + "; explained by " + diagnosis.reason;
-  }
+  // How large the residual was, what it comes from, and what is left.
+  diagnosis.reason = residual_words + "; explained by " + diagnosis.reason + after_words;
   result.diagnosis = std::move(diagnosis);
   return worst;
 }

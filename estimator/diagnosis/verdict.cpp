@@ -20,9 +20,12 @@ std::string comparison(const AxisVerdictInput& axis) {
   return text;
 }
 
+std::string of_axis(std::size_t axis, const std::string& words) {
+  return std::string(kAxisName[axis]) + " axis: " + words;
+}
+
 void append(std::string& text, std::size_t axis, const std::string& words) {
-  if (!text.empty()) text += "; ";
-  text += std::string(kAxisName[axis]) + " axis: " + words;
+  text += (text.empty() ? "" : "; ") + of_axis(axis, words);
 }
 
 }  // namespace
@@ -41,6 +44,10 @@ const char* to_string(Verdict verdict) {
       break;
   }
   return "undetermined";
+}
+
+std::string compare_with_expected(const AxisVerdictInput& input, std::size_t axis) {
+  return of_axis(axis, comparison(input));
 }
 
 bool is_unexplained(const VerdictInput& input, std::size_t axis) {

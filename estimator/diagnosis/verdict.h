@@ -1,6 +1,8 @@
 // From the residual tests of three axes to one verdict and one sentence for a person.
 #pragma once
 
+#include <string>
+
 #include "estimator/calibrate.h"
 
 namespace plumbline {
@@ -28,6 +30,9 @@ inline constexpr std::size_t kFewestPosesToDecide = 30;
 /// True when the data allow a decision about this axis and its residual is not the noise's. Each of
 /// the three axes gets a third of kFalseAlarmShare (Bonferroni).
 bool is_unexplained(const VerdictInput& input, std::size_t axis);
+
+/// "x axis: residual 0.088 m/s² where 0.028 ± 0.002 is expected".
+std::string compare_with_expected(const AxisVerdictInput& input, std::size_t axis);
 
 /// Fills verdict, reason and p_value.
 void decide_verdict(const VerdictInput& input, Diagnosis& diagnosis);

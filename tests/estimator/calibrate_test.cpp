@@ -52,17 +52,24 @@ TEST(Calibrate, FindsTheUnitAndItsNoise) {
   EXPECT_EQ(result.decision.status, DecisionStatus::none);
 }
 
-// White noise on 60 poses: their RMS scatters by 1/√(2·56).
-TEST(Calibrate, SaysHowFarChanceTakesTheResidual) {
-  const std::string reason = calibrated(synthetic_run(1, kSixteenBits)).diagnosis.reason;
+/// What a reason says of the x axis, m/s².
+struct ReasonOfX {
   double residual = 0, expected = 0, u = 0;
-  const std::size_t at = reason.find("x axis: ");
-  ASSERT_NE(at, std::string::npos) << reason;
-  ASSERT_EQ(std::sscanf(reason.c_str() + at, "x axis: residual %lf m/s² where %lf ± %lf", &residual,
-                        &expected, &u),
+};
+ReasonOfX reason_of_x(const std::string& reason) {
+  ReasonOfX x;
+  const std::size_t at = std::min(reason.find("x axis: "), reason.size());
+  EXPECT_EQ(std::sscanf(reason.c_str() + at, "x axis: residual %lf m/s² where %lf ± %lf",
+                        &x.residual, &x.expected, &x.u),
             3)
       << reason;
-  EXPECT_NEAR(u / expected, 1 / std::sqrt(2.0 * 56), 0.03);
+  return x;
+}
+
+// White noise on 60 poses: their RMS scatters by 1/√(2·56).
+TEST(Calibrate, SaysHowFarChanceTakesTheResidual) {
+  const ReasonOfX x = reason_of_x(calibrated(synthetic_run(1, kSixteenBits)).diagnosis.reason);
+  EXPECT_NEAR(x.u / x.expected, 1 / std::sqrt(2.0 * 56), 0.03);
 }
 
 TEST(Calibrate, FollowsTheEstimateFromPoseToPose) {
@@ -89,7 +96,15 @@ TEST(Calibrate, SaysWhenTheModelLacksSomething) {
   options.k2_x_V_per_g2 = 0.032 * 0.05;
   const Calibration result = calibrated(synthetic_run(3, kSixteenBits, options));
   EXPECT_EQ(result.diagnosis.verdict, Verdict::explained);
-  EXPECT_THAT(result.diagnosis.reason, HasSubstr("x axis: residual"));
+  const std::string& reason = result.diagnosis.reason;
+  const ReasonOfX x = reason_of_x(reason);
+  EXPECT_NEAR(x.residual, result.before.fit_pose_rms_mps2[0], 0.01 * x.residual);
+  EXPECT_NEAR(x.expected, result.floor_pose_rms_mps2[0], 0.01 * x.expected);
+  EXPECT_THAT(reason, HasSubstr("; explained by sensor.quadratic (x)"));
+  double after = 0;
+  const std::size_t at = std::min(reason.find("; after: "), reason.size());
+  EXPECT_EQ(std::sscanf(reason.c_str() + at, "; after: x axis %lf m/s²", &after), 1) << reason;
+  EXPECT_NEAR(after, x.expected, 3 * x.u);
   EXPECT_LT(result.diagnosis.p_value, 1e-6);
   ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
   const FoundEffect& effect = result.diagnosis.effects[0];
