@@ -127,11 +127,14 @@ struct EnlargedFit : EnlargedEstimate {
   bool determined = true;  ///< no direction of the free parameters is unobservable
 };
 
+/// Of a fit that is to settle.
+inline constexpr int kMostIterations = 20;
+
 /// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
 /// factorisation).
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start,
-                         int most_iterations = 20);
+                         int most_iterations = kMostIterations);
 
 /// The same; where that leaves something undetermined, the shapes of the effects from `first_new`
 /// on stay where they ended up: a boundary between two readings, say, that the visits do not place.

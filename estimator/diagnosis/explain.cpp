@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <string>
 
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
@@ -227,7 +225,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   PerAxis<bool> concerned{};
   for (const ActiveEffect& active : found.fit.parameters.effects)
     for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
-  std::string residual_words, after_words;
+  PerAxis<std::optional<AxisVerdictInput>> residual;
   WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -244,29 +242,19 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
     // The noise estimated beside the effects, not the one that had to take them up.
     const auto block = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
-    const Eigen::MatrixXd lower = found.whitening.lower[i].triangularView<Eigen::Lower>();
-    const double expected_V2 = (lower.rowwise().squaredNorm().sum() -
-                                (block * under_this_noise).cwiseProduct(block).sum()) /
-                               static_cast<double>(n);
-    const double floor_mps2 = std::abs(factor) * std::sqrt(std::max(expected_V2, 0.0));
+    const Eigen::MatrixXd left_V2 =
+        found.noise[i].covariance - block * under_this_noise * block.transpose();
+    const double floor_mps2 =
+        std::abs(factor) * std::sqrt(std::max(left_V2.trace(), 0.0) / static_cast<double>(n));
     if (result.floor_pose_rms_mps2[i] > 0) {
       result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
     }
     result.floor_pose_rms_mps2[i] = floor_mps2;
-    if (concerned[i]) {
-      const double by_chance_V = scatter_of_rms_V(found.noise[i].covariance -
-                                                  block * under_this_noise * block.transpose());
-      AxisVerdictInput words;
-      words.rms_mps2 = result.before.fit_pose_rms_mps2[i];
-      words.expected_mps2 = floor_mps2;
-      words.u_expected_mps2 =
-          std::hypot(result.u_floor_pose_rms_mps2[i], std::abs(factor) * by_chance_V);
-      residual_words += (residual_words.empty() ? "" : "; ") + compare_with_expected(words, i);
-      char text[40];
-      std::snprintf(text, sizeof text, "%s axis %.3g m/s²", kAxisName[i],
-                    result.after.fit_pose_rms_mps2[i]);
-      after_words += (after_words.empty() ? "; after: " : ", ") + std::string(text);
-    }
+    if (concerned[i])
+      residual[i] = {.rms_mps2 = result.before.fit_pose_rms_mps2[i],
+                     .expected_mps2 = floor_mps2,
+                     .u_expected_mps2 = std::hypot(result.u_floor_pose_rms_mps2[i],
+                                                   std::abs(factor) * scatter_of_rms_V(left_V2))};
     result.after.heldout_pose_rms_mps2[i] = rms(heldout_errors_mps2[i]);
     result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout_errors_mps2[i]);
     result.after.sample_rms_mps2[i] =
@@ -286,8 +274,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     diagnosis.verdict = Verdict::partly_explained;
   }
   diagnosis.axis_test = result.diagnosis.axis_test;
-  // How large the residual was, what it comes from, and what is left.
-  diagnosis.reason = residual_words + "; explained by " + diagnosis.reason + after_words;
+  diagnosis.reason = reason_of_findings(residual, diagnosis.reason, result.after.fit_pose_rms_mps2);
   result.diagnosis = std::move(diagnosis);
   return worst;
 }

@@ -192,13 +192,14 @@ void SearchModel::look_closer() {
   // Of many, the best few are known before they have settled.
   constexpr std::size_t kFew = 8;
   if (fits.size() > kFew) {
-    fit_all(2);
+    constexpr int kFirstLook = 2;
+    fit_all(kFirstLook);
     std::erase_if(fits, [](const EnlargedFit& with) { return !with.determined; });
     std::stable_sort(fits.begin(), fits.end(),
                      [](const EnlargedFit& a, const EnlargedFit& b) { return a.chi2 < b.chi2; });
     fits.resize(std::min(fits.size(), kFew));
   }
-  fit_all(20);
+  fit_all(kMostIterations);
   const EnlargedFit* best = nullptr;
   for (const EnlargedFit& with : fits)
     if (with.determined && with.chi2 < stage_.fit.chi2 - kClearly &&

@@ -20,12 +20,9 @@ std::string comparison(const AxisVerdictInput& axis) {
   return text;
 }
 
-std::string of_axis(std::size_t axis, const std::string& words) {
-  return std::string(kAxisName[axis]) + " axis: " + words;
-}
-
 void append(std::string& text, std::size_t axis, const std::string& words) {
-  text += (text.empty() ? "" : "; ") + of_axis(axis, words);
+  if (!text.empty()) text += "; ";
+  text += std::string(kAxisName[axis]) + " axis: " + words;
 }
 
 }  // namespace
@@ -44,10 +41,6 @@ const char* to_string(Verdict verdict) {
       break;
   }
   return "undetermined";
-}
-
-std::string compare_with_expected(const AxisVerdictInput& input, std::size_t axis) {
-  return of_axis(axis, comparison(input));
 }
 
 bool is_unexplained(const VerdictInput& input, std::size_t axis) {
@@ -87,6 +80,20 @@ void decide_verdict(const VerdictInput& input, Diagnosis& diagnosis) {
     diagnosis.verdict = Verdict::clean;
     diagnosis.reason = "the residual is what the identified noise leaves: " + ordinary;
   }
+}
+
+std::string reason_of_findings(const PerAxis<std::optional<AxisVerdictInput>>& residual,
+                               const std::string& findings, const PerAxis<double>& after_mps2) {
+  std::string before, after;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (!residual[axis]) continue;
+    append(before, axis, comparison(*residual[axis]));
+    char text[40];
+    std::snprintf(text, sizeof text, "%s%s axis %.3g m/s²", after.empty() ? "" : ", ",
+                  kAxisName[axis], after_mps2[axis]);
+    after += text;
+  }
+  return before + "; explained by " + findings + "; after: " + after;
 }
 
 }  // namespace plumbline

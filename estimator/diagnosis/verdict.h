@@ -1,6 +1,7 @@
 // From the residual tests of three axes to one verdict and one sentence for a person.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "estimator/calibrate.h"
@@ -31,10 +32,13 @@ inline constexpr std::size_t kFewestPosesToDecide = 30;
 /// the three axes gets a third of kFalseAlarmShare (Bonferroni).
 bool is_unexplained(const VerdictInput& input, std::size_t axis);
 
-/// "x axis: residual 0.088 m/s² where 0.028 ± 0.002 is expected".
-std::string compare_with_expected(const AxisVerdictInput& input, std::size_t axis);
-
 /// Fills verdict, reason and p_value.
 void decide_verdict(const VerdictInput& input, Diagnosis& diagnosis);
+
+/// How large the residual of the axes concerned was against what the noise beside the findings
+/// leaves, what it comes from, and what is left: "x axis: residual 0.088 m/s² where 0.028 ± 0.002
+/// is expected; explained by sensor.quadratic (x) …; after: x axis 0.028 m/s²".
+std::string reason_of_findings(const PerAxis<std::optional<AxisVerdictInput>>& residual,
+                               const std::string& findings, const PerAxis<double>& after_mps2);
 
 }  // namespace plumbline

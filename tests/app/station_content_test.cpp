@@ -77,6 +77,7 @@ TEST_F(StationTest, FollowsASessionAndOutlivesIt) {
   const auto running = await(look, [](const auto& now) {
     return now["phase"] == "running" && now["status"]["state"] == "sampling";
   });
+  EXPECT_EQ(running["status"]["state"], "sampling");
   EXPECT_EQ(running["run"]["serial"], "A-7");
   EXPECT_TRUE(running["verdict"].is_null());
   EXPECT_EQ(json("/api/trace")["trace"][0][4], 21.25);
@@ -182,6 +183,7 @@ TEST_F(StationTest, PromtoolLikesTheMetrics) {
         });
   const Answer metrics = get("/metrics");
   EXPECT_THAT(metrics.head, HasSubstr("version=0.0.4"));
+  EXPECT_THAT(metrics.body, HasSubstr("plumbline_sensor_temperature_celsius 20\n"));
   write_text(folder_ / "metrics", metrics.body);
   const std::string command = "promtool check metrics < " + (folder_ / "metrics").string() + " > " +
                               (folder_ / "said").string() + " 2>&1";

@@ -35,7 +35,9 @@
 #include <vector>
 
 #include "estimator/calibrate.h"
+#include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/measurement.h"
+#include "estimator/pose_means.h"
 #include "rig/sim/random.h"
 #include "rig/sim/record.h"
 #include "rig/sim/world.h"
@@ -180,8 +182,9 @@ void score_oracle(const StudySet& set, SetOutcome& outcome);
 /// Error on the fresh poses of one who is told the effects, m/s²; NaN where the estimator does not
 /// consider a listed one with these readings.
 double told_fresh_mps2(const SetDesign& design, const StudySet& set);
-/// Root mean square over the fresh poses that count, which are the last of `all` poses.
-double fresh_rms(const StudySet& set, const Eigen::VectorXd& all);
+/// Error of a model on the fresh poses that count; `poses` and `log` are those of the session.
+double fresh_error_mps2(const StudySet& set, const std::vector<PoseMean>& poses,
+                        const VisitLog& log, const EnlargedParameters& model);
 /// Root mean square over the axes.
 double over_axes(const PerAxis<double>& rms_mps2);
 /// The fresh poses appended to the run: one record on one clock.

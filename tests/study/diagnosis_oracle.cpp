@@ -76,7 +76,24 @@ PoseWhitening true_whitening(const StudySet& set, const VisitLog& log) {
   return whitening;
 }
 
+/// Root mean square over the fresh poses that count, which are the last of `all` poses.
+double fresh_rms(const StudySet& set, const Eigen::VectorXd& all) {
+  return rms(all.tail(std::ssize(set.set.verification.poses) - 1));
+}
+
 }  // namespace
+
+double fresh_error_mps2(const StudySet& set, const std::vector<PoseMean>& poses,
+                        const VisitLog& log, const EnlargedParameters& model) {
+  const auto predicted_V = predict_means_V(log, model);
+  PerAxis<double> mps2{};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisEstimate twelve{model.twelve[i], Eigen::Matrix4d::Zero()};
+    mps2[i] = fresh_rms(
+        set, input_referred_mps2_per_V(twelve, i) * (mean_voltages(poses, i) - predicted_V[i]));
+  }
+  return over_axes(mps2);
+}
 
 PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
   PerAxis<Eigen::Vector4d> truth;
@@ -101,10 +118,6 @@ PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
     }
   }
   return truth;
-}
-
-double fresh_rms(const StudySet& set, const Eigen::VectorXd& all) {
-  return rms(all.tail(std::ssize(set.set.verification.poses) - 1));
 }
 
 void score_oracle(const StudySet& set, SetOutcome& outcome) {
@@ -161,16 +174,8 @@ double told_listed_mps2(const StudySet& set) {
                 [](const ActiveEffect& active) { return !active.effect->carries_over(); });
 
   const MeasurementSet all = session(set);
-  const auto poses = pose_means(all);
-  const auto predicted_V =
-      predict_means_V(make_visit_log(all, set.set.description), told.parameters);
-  PerAxis<double> mps2{};
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const AxisEstimate twelve{told.parameters.twelve[i], Eigen::Matrix4d::Zero()};
-    mps2[i] = fresh_rms(
-        set, input_referred_mps2_per_V(twelve, i) * (mean_voltages(poses, i) - predicted_V[i]));
-  }
-  return over_axes(mps2);
+  return fresh_error_mps2(set, pose_means(all), make_visit_log(all, set.set.description),
+                          told.parameters);
 }
 
 /// What the effects of the world do to the pose means, V.

@@ -9,8 +9,6 @@
 #include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/diagnosis/explain.h"
 #include "estimator/error_figures.h"
-#include "estimator/fit/generalised_fit.h"
-#include "estimator/fit/least_squares.h"
 #include "estimator/pose_means.h"
 #include "rig/sim/effects/effect.h"
 #include "tests/study/diagnosis.h"
@@ -176,21 +174,12 @@ void check_twelve(const StudySet& set, const Calibration& calibration, SetOutcom
 void score_fresh(const StudySet& set, const CertifiedModel& model, SetOutcome& outcome) {
   const MeasurementSet all = session(set);
   const auto poses = pose_means(all);
-  const Eigen::MatrixXd A = design_matrix(poses, set.set.description.gravity);
   const VisitLog log = make_visit_log(all, set.set.description);
+  EnlargedParameters alone;
+  for (std::size_t i = 0; i < kAxisCount; ++i) alone.twelve[i] = model.twelve[i].value;
   const RestoredModel restored = restore_model(model, log);
-  const auto predicted_V = predict_means_V(log, restored.parameters);
-  PerAxis<double> before_mps2{};
-  PerAxis<double> after_mps2{};
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const Eigen::VectorXd y = mean_voltages(poses, i);
-    before_mps2[i] = fresh_rms(
-        set, input_referred_mps2_per_V(model.twelve[i], i) * (y - A * model.twelve[i].value));
-    after_mps2[i] =
-        fresh_rms(set, input_referred_mps2_per_V(model.final[i], i) * (y - predicted_V[i]));
-  }
-  outcome.before.fresh = over_axes(before_mps2);
-  outcome.after.fresh = over_axes(after_mps2);
+  outcome.before.fresh = fresh_error_mps2(set, poses, log, alone);
+  outcome.after.fresh = fresh_error_mps2(set, poses, log, restored.parameters);
 }
 
 std::string describe_truth(const std::vector<sim::EffectSetting>& effects) {

@@ -131,17 +131,20 @@ TEST(DiagnosisStudy, SlowNoiseAtTheEdgesOfACoarseStepIsNoStructure) {
   expect_only_finding(outcome);
 }
 
+SetOutcome in_serpentine_order(const char* effect) {
+  return run_set({.seed = 760002,
+                  .effects = {effect},
+                  .size = 3,
+                  .order = sim::RecordOrder::snake,
+                  .noise = NoiseKind::examples,
+                  .bits = 16,
+                  .samples_per_pose = 50,
+                  .static_s = 600});
+}
+
 // A train that explains steps one by one may take the place of another train.
 TEST(DiagnosisStudy, WhatSwitchesRegularlyIsOneTrainNotSteps) {
-  const SetOutcome outcome = run_set({.seed = 760002,
-                                      .effects = {"own.compressor"},
-                                      .size = 3,
-                                      .order = sim::RecordOrder::snake,
-                                      .noise = NoiseKind::examples,
-                                      .bits = 16,
-                                      .samples_per_pose = 50,
-                                      .static_s = 600});
-  expect_its_driver_and_no_listed_name(outcome);
+  expect_its_driver_and_no_listed_name(in_serpentine_order("own.compressor"));
 }
 
 // In serpentine order the shorter way round is the only one; between fresh poses it is not, and the
@@ -298,14 +301,7 @@ TEST(DiagnosisStudy, WhoIsToldTheEffectErrsAsMuch) {
 
 // A drift looks better as long as the noise is the one that had to take up the creep.
 TEST(DiagnosisStudy, CreepInSlowNoiseIsNotTakenForADrift) {
-  const SetOutcome outcome = run_set({.seed = 760002,
-                                      .effects = {"own.creep"},
-                                      .size = 3,
-                                      .order = sim::RecordOrder::snake,
-                                      .noise = NoiseKind::examples,
-                                      .bits = 16,
-                                      .samples_per_pose = 50,
-                                      .static_s = 600});
+  const SetOutcome outcome = in_serpentine_order("own.creep");
   expect_driver_and_error_of_the_oracle(outcome);
   EXPECT_EQ(outcome.listed_instead, 0) << outcome.found;
 }
