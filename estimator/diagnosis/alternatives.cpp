@@ -92,8 +92,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   std::vector<Alternative> singles;
   // Responses at the final model: they hardly depend on the parameters.
   const CandidateGains gains_of(result.responses, without);
-  const auto ranked =
-      best_of_families(list, gains_of, gains_of.of(without.whitened_residual).col(0));
+  const auto ranked = best_of_families(list, gains_of, gains_of.of_residual());
   std::vector<Candidate> refined;
   for (const Rival& rival : ranked) {
     // The first order may understate a nonlinear rival, but not by this much.
@@ -128,7 +127,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
     std::vector<Rival> order = ranked;
     if (!sum.empty()) {
       const CandidateGains next(result.responses, fit);
-      order = best_of_families(list, next, next.of(fit.whitened_residual).col(0));
+      order = best_of_families(list, next, next.of_residual());
     }
     const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {
       const Candidate& candidate = list.candidates[r.candidate];

@@ -298,6 +298,7 @@ CandidateResponses some_of(const CandidateResponses& responses,
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
     : responses_(responses) {
   model_basis_ = orthonormal_basis(fit.whitened_jacobian);
+  residual_ = project(fit.whitened_residual);
   std::array<Eigen::MatrixXd, kGroups> taken;  // by the model's parameters, columns × p
   parallel_for(taken.size(),
                [&](std::size_t g) { taken[g] = responses.groups[g].products(model_basis_); });

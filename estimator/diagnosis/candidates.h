@@ -83,7 +83,9 @@ class CandidateGains {
   /// Responses and fit belong to the same whitening.
   CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit);
 
-  /// By how much each candidate would lower the sum of squares of `whitened` (stacked rows, free of
+  /// By how much each candidate would lower the sum of squares of the fit's residual.
+  Eigen::VectorXd of_residual() const { return of(residual_).col(0); }
+  /// The same of `whitened` (stacked rows, free of
   /// what the model's parameters take up; one column a replicate): candidates × columns.
   Eigen::MatrixXd of(const Eigen::MatrixXd& whitened) const;
   /// Free directions of a candidate; 0 when the model absorbs it.
@@ -95,7 +97,10 @@ class CandidateGains {
 
  private:
   const CandidateResponses& responses_;
-  Eigen::MatrixXd model_basis_;             ///< stacked × p, orthonormal
+  Eigen::MatrixXd model_basis_;  ///< stacked × p, orthonormal
+  /// Of the fit, without what its last step left along the model, which a candidate that the model
+  /// all but absorbs would be credited with many times over.
+  Eigen::VectorXd residual_;
   std::vector<Eigen::MatrixXd> transform_;  ///< dof × columns: to orthonormal directions
 };
 

@@ -1,6 +1,9 @@
 #include "estimator/diagnosis/exchange.h"
 
 #include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/screening.h"
@@ -22,8 +25,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   if (!without.determined) return exchanges;
   const double spent = model.price_of(subset);
   const CandidateGains gains(responses, without);
-  const std::vector<Scored> ranked =
-      screen(model.list(), gains, gains.of(without.whitened_residual).col(0));
+  const std::vector<Scored> ranked = screen(model.list(), gains, gains.of_residual());
   for (std::size_t r = 0; r < std::min(kMostRefined, ranked.size()); ++r) {
     const std::size_t index = ranked[r].candidate;
     const Candidate& candidate = model.list().candidates[index];
@@ -61,6 +63,121 @@ bool exchange_one(SearchModel& model) {
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     for (const SearchModel::Entry& with : exchanges[s])
       if (model.exchange(subsets[s], with)) return true;
+  }
+  return false;
+}
+
+namespace {
+
+bool has_name(const Candidate& candidate) { return candidate.handicap == 0; }
+
+/// What has no name: all of it, then what has the same driver and acts on the same, part by part.
+std::vector<std::vector<std::size_t>> unlisted_of(const SearchModel& model) {
+  std::vector<std::vector<std::size_t>> subsets;
+  std::vector<std::size_t> all;
+  for (std::size_t k = 0; k < model.size(); ++k) {
+    const Candidate& chosen = model.candidate(k);
+    if (has_name(chosen)) continue;
+    all.push_back(k);
+    const auto like_it = std::find_if(subsets.begin(), subsets.end(), [&](const auto& subset) {
+      const Candidate& other = model.candidate(subset.front());
+      return other.effect->id() == chosen.effect->id() && other.axis == chosen.axis;
+    });
+    if (like_it == subsets.end())
+      subsets.push_back({k});
+    else
+      like_it->push_back(k);
+  }
+  if (subsets.size() > 1) subsets.insert(subsets.begin(), all);
+  return subsets;
+}
+
+/// Candidates with a name, and what they would add.
+struct Named {
+  CandidateList list;
+  std::vector<std::size_t> index;  ///< of each in the list that they are from
+  CandidateResponses responses;
+};
+Named named_candidates(SearchModel& model) {
+  Named named;
+  const std::vector<Candidate>& candidates = model.list().candidates;
+  for (std::size_t c = 0; c < candidates.size(); ++c)
+    if (has_name(candidates[c])) named.index.push_back(c);
+  for (const std::size_t c : named.index) named.list.candidates.push_back(candidates[c]);
+  named.list.family_size = model.list().family_size;
+  named.responses = some_of(model.responses(), named.index);
+  return named;
+}
+
+/// The likeliest of them beside a fit, if the search as a whole would not often find as much in
+/// noise, and the fit with it.
+struct Next {
+  SearchModel::Entry entry;
+  EnlargedFit fit;
+};
+std::optional<Next> likeliest_beside(const SearchModel& model, const Named& named,
+                                     const EnlargedFit& fit,
+                                     const std::vector<std::size_t>& replaced) {
+  constexpr std::size_t kMostRefined = 4;
+  const CandidateGains gains(named.responses, fit);
+  std::optional<Next> best;
+  double best_score = std::numeric_limits<double>::infinity();
+  std::size_t refined = 0;
+  for (const Scored& s : screen(named.list, gains, gains.of_residual())) {
+    const Candidate& candidate = named.list.candidates[s.candidate];
+    const bool is_there = std::any_of(
+        fit.parameters.effects.begin(), fit.parameters.effects.end(), [&](const ActiveEffect& e) {
+          return e.effect == candidate.effect && e.axis == candidate.axis;
+        });
+    if (model.is_chosen_beside(replaced, candidate) || (is_there && !candidate.effect->repeats()))
+      continue;
+    if (refined++ == kMostRefined) break;
+    const std::size_t index = named.index[s.candidate];
+    EnlargedFit with = model.fit_with(fit.parameters, candidate.active());
+    if (!with.determined) continue;
+    const double log_p = model.log_p_of(index, fit.chi2 - with.chi2, s.dof, with);
+    const double score = log_p + (s.score - s.log_p);
+    if (score >= best_score) continue;
+    best_score = score;
+    best = {{index, model.p_of(log_p), with.parameters}, std::move(with)};
+  }
+  if (best && best->entry.p > model.options().false_alarm) best.reset();
+  return best;
+}
+
+/// Named candidates in the place of a subset, as many as are cheapest; empty if none are worth
+/// their price.
+std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named& named,
+                                          const std::vector<std::size_t>& subset) {
+  constexpr double kClearly = 2;
+  const std::size_t most = subset.size() + 2;
+  std::vector<SearchModel::Entry> names;
+  std::size_t worth = 0;
+  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kClearly, price = 0;
+  EnlargedFit fit = model.fit_without(subset);
+  while (fit.determined && names.size() < most) {
+    std::optional<Next> next = likeliest_beside(model, named, fit, subset);
+    if (!next) break;
+    price += model.price(next->entry.candidate);
+    names.push_back(std::move(next->entry));
+    fit = std::move(next->fit);
+    if (fit.chi2 + price >= least_cost) continue;
+    least_cost = fit.chi2 + price;
+    worth = names.size();
+  }
+  names.resize(worth);
+  return names;
+}
+
+}  // namespace
+
+bool name_unlisted(SearchModel& model) {
+  const std::vector<std::vector<std::size_t>> subsets = unlisted_of(model);
+  if (subsets.empty()) return false;
+  const Named named = named_candidates(model);
+  for (const auto& subset : subsets) {
+    const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
+    if (!names.empty() && model.exchange(subset, names)) return true;
   }
   return false;
 }

@@ -12,6 +12,10 @@ namespace plumbline {
 /// Whether there was one.
 bool exchange_one(SearchModel& model);
 
+/// What has no name gives way to effects that have one, as many as it takes, where these are worth
+/// their price: two of them together may have looked like one structure.
+bool name_unlisted(SearchModel& model);
+
 /// The same for effect k where it is slow and there is slow noise: the rivals are compared each
 /// with the noise that suits it.
 bool exchange_slow(SearchModel& model, std::size_t k);

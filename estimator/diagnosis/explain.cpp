@@ -27,28 +27,27 @@ double mps2_per_V(const EnlargedParameters& model, std::size_t axis) {
 /// Held-out errors of both partitions, m/s², one vector of 2n per axis.
 PerAxis<Eigen::VectorXd> heldout_mps2(const Heldout& heldout, const std::vector<Blocks>& partitions,
                                       const EnlargedFit& fit) {
-  const auto parts = heldout.residuals_V(fit, partitions);
+  const auto parts = heldout.leave_out(fit, partitions);
   PerAxis<Eigen::VectorXd> all;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    all[i].resize(parts[0][i].size() + parts[1][i].size());
-    all[i] << parts[0][i], parts[1][i];
+    all[i].resize(parts[0].residual_V[i].size() + parts[1].residual_V[i].size());
+    all[i] << parts[0].residual_V[i], parts[1].residual_V[i];
     all[i] *= mps2_per_V(fit.parameters, i);
   }
   return all;
 }
 
-double power(const PerAxis<Eigen::VectorXd>& errors, const std::vector<std::size_t>& axes) {
-  double sum = 0;
-  for (std::size_t axis : axes) sum += rms(errors[axis]) * rms(errors[axis]);
-  return sum;
-}
-
 /// Share of the excess held-out residual power that an effect removes.
-double heldout_gain(const PerAxis<Eigen::VectorXd>& without, const PerAxis<Eigen::VectorXd>& with,
-                    const PerAxis<double>& floor_mps2, const std::vector<std::size_t>& axes) {
-  double expected = 0;
-  for (std::size_t axis : axes) expected += floor_mps2[axis] * floor_mps2[axis];
-  return share_removed(power(without, axes), power(with, axes), expected);
+double heldout_gain(const std::vector<LeftOut>& without, const std::vector<LeftOut>& with,
+                    const std::vector<std::size_t>& axes) {
+  double power_without = 0, power_with = 0, expected = 0;
+  for (std::size_t part = 0; part < with.size(); ++part)
+    for (const std::size_t axis : axes) {
+      power_without += without[part].power[axis];
+      power_with += with[part].power[axis];
+      expected += static_cast<double>(with[part].residual_V[axis].size());
+    }
+  return share_removed(power_without, power_with, expected);
 }
 
 /// Four parameters of one axis out of the joint estimate.
@@ -133,13 +132,12 @@ AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& searc
 
 /// Effects that do not help where they were not fitted are no effects.
 void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
-                              const std::vector<Blocks>& partitions,
-                              const PerAxis<double>& floor_mps2, SearchResult& found,
+                              const std::vector<Blocks>& partitions, SearchResult& found,
                               std::vector<double>& gains) {
   for (bool dropped = true; dropped && !found.evidence.empty();) {
     dropped = false;
     gains.clear();
-    const auto with = heldout_mps2(heldout, partitions, found.fit);
+    const auto with = heldout.leave_out(found.fit, partitions);
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
       const ActiveEffect removed = found.fit.parameters.effects[k];
       EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening,
@@ -149,10 +147,10 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
         continue;
       }
       // What changes within the dwell may hardly be seen in the means.
-      const double gain = std::max(heldout_gain(heldout_mps2(heldout, partitions, without), with,
-                                                floor_mps2, axes_of(removed)),
-                                   heldout_dwell_gain(search.log, found.observed, found.whitening,
-                                                      found.fit, k, partitions));
+      const double gain =
+          std::max(heldout_gain(heldout.leave_out(without, partitions), with, axes_of(removed)),
+                   heldout_dwell_gain(search.log, found.observed, found.whitening, found.fit, k,
+                                      partitions));
       // One pose's own error cannot be predicted from other poses.
       const bool own =
           removed.effect->concerns_one_visit() || removed.effect->certain(search.log, removed.axis);
@@ -193,7 +191,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
   const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
-  drop_what_does_not_carry(search, heldout, partitions, result.floor_pose_rms_mps2, found, gains);
+  drop_what_does_not_carry(search, heldout, partitions, found, gains);
   if (found.evidence.size() != before_dropping)
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
   if (found.evidence.empty()) return without_effects();

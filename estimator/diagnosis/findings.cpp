@@ -127,7 +127,42 @@ bool shares_an_entry(const Effect& effect) {
   return effect.subject() == Subject::sensor || effect.concerns_one_visit();
 }
 
-/// One entry per id, axes and parameters together; smooth terms apart.
+/// Where an effect of the model is reported: at which place of which list.
+struct Place {
+  bool unlisted = false;
+  std::size_t index = 0;
+};
+
+/// Of each effect of a model, in its order. A column that changes the bias of one axis and the
+/// scale of another is two effects under one id.
+std::vector<Place> places_of(const std::vector<const Effect*>& effects) {
+  std::vector<Place> places;
+  std::size_t listed = 0, unlisted = 0;
+  for (const Effect* effect : effects) {
+    if (dynamic_cast<const SmoothTerm*>(effect) != nullptr) {
+      places.push_back({true, unlisted++});
+      continue;
+    }
+    const auto same = std::find(effects.begin(), effects.end(), effect) - effects.begin();
+    const bool joins = shares_an_entry(*effect) && same < std::ssize(places);
+    places.push_back(joins ? places[static_cast<std::size_t>(same)] : Place{false, listed++});
+  }
+  return places;
+}
+
+std::vector<Place> places_of(const EnlargedParameters& model) {
+  std::vector<const Effect*> effects;
+  for (const ActiveEffect& active : model.effects) effects.push_back(active.effect);
+  return places_of(effects);
+}
+
+std::vector<Place> places_of(const std::vector<Evidence>& evidence) {
+  std::vector<const Effect*> effects;
+  for (const Evidence& found : evidence) effects.push_back(found.candidate.effect);
+  return places_of(effects);
+}
+
+/// One entry per place.
 struct Reported {
   std::vector<FoundEffect> effects;
   std::vector<UnlistedStructure> unlisted;
@@ -135,35 +170,31 @@ struct Reported {
 
 Reported report(const VisitLog& log, const EnlargedEstimate& estimate) {
   Reported reported;
-  for (std::size_t e = 0; e < estimate.parameters.effects.size(); ++e) {
+  const std::vector<Place> places = places_of(estimate.parameters);
+  for (std::size_t e = 0; e < places.size(); ++e) {
     const ActiveEffect& active = estimate.parameters.effects[e];
     std::vector<EffectParameter> parameters = report_parameters(log, estimate, e);
-    if (const auto* term = dynamic_cast<const SmoothTerm*>(active.effect)) {
+    if (places[e].unlisted) {
+      const auto* term = dynamic_cast<const SmoothTerm*>(active.effect);
       reported.unlisted.push_back({term->driver(), to_string(term->form()), axes_of(active),
                                    term->shape(), std::move(parameters), 1, 0});
       continue;
     }
-    std::vector<FoundEffect>& found = reported.effects;
-    const std::string id = active.effect->id();
-    auto entry = found.end();
-    if (shares_an_entry(*active.effect)) {
-      entry = std::find_if(found.begin(), found.end(),
-                           [&](const FoundEffect& f) { return f.id == id; });
-    }
-    if (entry == found.end()) {
+    if (places[e].index == reported.effects.size()) {
       FoundEffect fresh;
-      fresh.id = id;
+      fresh.id = active.effect->id();
       fresh.p_value = 0;
       fresh.definition = active.effect->definition();
-      entry = found.insert(found.end(), std::move(fresh));
+      reported.effects.push_back(std::move(fresh));
     }
+    FoundEffect& entry = reported.effects[places[e].index];
     for (std::size_t axis : axes_of(active)) {
-      if (std::find(entry->axes.begin(), entry->axes.end(), axis) == entry->axes.end()) {
-        entry->axes.push_back(axis);
+      if (std::find(entry.axes.begin(), entry.axes.end(), axis) == entry.axes.end()) {
+        entry.axes.push_back(axis);
       }
     }
-    std::sort(entry->axes.begin(), entry->axes.end());
-    for (EffectParameter& p : parameters) entry->parameters.push_back(std::move(p));
+    std::sort(entry.axes.begin(), entry.axes.end());
+    for (EffectParameter& p : parameters) entry.parameters.push_back(std::move(p));
   }
   return reported;
 }
@@ -185,18 +216,16 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
   auto [effects, unlisted] = report(input.log, search.fit);
   diagnosis.not_found = detection_limits(input, list, search);
   const std::vector<Rivals> rivals = all_rivals(input, list, search, reach);
-  std::size_t next_unlisted = 0;
-  for (std::size_t e = 0; e < search.evidence.size(); ++e) {
-    const Effect& effect = *search.evidence[e].candidate.effect;
-    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
-      unlisted[next_unlisted++].p_value = search.evidence[e].p_value;
+  const std::vector<Place> places = places_of(search.evidence);
+  for (std::size_t e = 0; e < places.size(); ++e) {
+    const double p_value = search.evidence[e].p_value;
+    if (places[e].unlisted) {
+      unlisted[places[e].index].p_value = p_value;
       continue;
     }
-    for (FoundEffect& entry : effects) {
-      if (entry.id != effect.id()) continue;
-      entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
-      add_rivals(rivals[e], entry);
-    }
+    FoundEffect& entry = effects[places[e].index];
+    entry.p_value = std::max(entry.p_value, p_value);
+    add_rivals(rivals[e], entry);
   }
   diagnosis.effects = std::move(effects);
   diagnosis.unlisted = std::move(unlisted);
@@ -228,20 +257,16 @@ void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosi
 
 void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
                   Diagnosis& diagnosis) {
-  std::size_t unlisted = 0;
-  for (std::size_t e = 0; e < evidence.size() && e < gains.size(); ++e) {
-    const Effect& effect = *evidence[e].candidate.effect;
+  const std::vector<Place> places = places_of(evidence);
+  for (std::size_t e = 0; e < places.size() && e < gains.size(); ++e) {
     const auto attach = [&](auto& entry) {
       entry.heldout_gain = std::max(entry.heldout_gain, gains[e]);
       entry.sigmas = std::max(entry.sigmas, evidence[e].sigmas);
     };
-    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) {
-      attach(diagnosis.unlisted[unlisted++]);
-      continue;
-    }
-    for (FoundEffect& entry : diagnosis.effects) {
-      if (entry.id == effect.id()) attach(entry);
-    }
+    if (places[e].unlisted)
+      attach(diagnosis.unlisted[places[e].index]);
+    else
+      attach(diagnosis.effects[places[e].index]);
   }
 }
 

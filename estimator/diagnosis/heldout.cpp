@@ -53,8 +53,8 @@ Eigen::MatrixXd conditional_covariance(const Eigen::MatrixXd& covariance,
 
 }  // namespace
 
-std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
-    const EnlargedFit& fit, const std::vector<Blocks>& partitions) const {
+std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
+                                        const std::vector<Blocks>& partitions) const {
   const Eigen::Index n = mean_V_[0].size();
   const std::vector<Eigen::Index> linear = linear_parameters(fit);
   const Eigen::MatrixXd covariance = conditional_covariance(fit.covariance, linear);
@@ -71,8 +71,8 @@ std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
     weighted_residual[i] = inverse_[i] * residual[i];
     weighted_jacobian[i] = inverse_[i] * axis_jacobian[i];
   }
-  const auto leave_out = [&](const std::vector<Eigen::Index>& block,
-                             PerAxis<Eigen::VectorXd>& heldout) {
+  const auto without = [&](const std::vector<Eigen::Index>& block,
+                           PerAxis<Eigen::VectorXd>& heldout) {
     // A free parameter for every reading of the block is the same as leaving it out.
     const Eigen::Index size = std::ssize(block);
     Eigen::MatrixXd Z = Eigen::MatrixXd::Zero(3 * size, 3 * size);
@@ -93,19 +93,30 @@ std::vector<PerAxis<Eigen::VectorXd>> Heldout::residuals_V(
     const Eigen::VectorXd d = scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right)));
     const Eigen::VectorXd shift =
         (covariance * (weighted.transpose() * d)).cwiseMax(-largest_shift).cwiseMin(largest_shift);
-    for (std::size_t i = 0; i < kAxisCount; ++i)
+    PerAxis<double> power;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
       heldout[i](block) = residual[i](block) + axis_jacobian[i](block, Eigen::all) * shift;
+      const Eigen::VectorXd seen =
+          weighted_residual[i](block) + weighted_jacobian[i](block, Eigen::all) * shift;
+      const Eigen::MatrixXd precision = inverse_[i](block, block);
+      power[i] = seen.dot(precision.llt().solve(seen));
+    }
+    return power;
   };
-  std::vector<PerAxis<Eigen::VectorXd>> result(partitions.size());
+  std::vector<LeftOut> result(partitions.size());
   std::vector<std::pair<std::size_t, std::size_t>> work;  // partition and block
   for (std::size_t part = 0; part < partitions.size(); ++part) {
-    result[part].fill(Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN()));
+    result[part].residual_V.fill(
+        Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN()));
     for (std::size_t b = 0; b < partitions[part].size(); ++b) work.emplace_back(part, b);
   }
+  std::vector<PerAxis<double>> power(work.size());
   parallel_for(work.size(), [&](std::size_t w) {
     const auto [part, b] = work[w];
-    leave_out(partitions[part][b], result[part]);
+    power[w] = without(partitions[part][b], result[part].residual_V);
   });
+  for (std::size_t w = 0; w < work.size(); ++w)
+    for (std::size_t i = 0; i < kAxisCount; ++i) result[work[w].first].power[i] += power[w][i];
   return result;
 }
 

@@ -6,6 +6,14 @@
 
 namespace plumbline {
 
+/// What a model leaves of poses that it was not fitted to.
+struct LeftOut {
+  PerAxis<Eigen::VectorXd> residual_V;  ///< n each; NaN for poses in no block
+  /// Sum of squares of an axis in units of the noise, of which the readings outside a block tell a
+  /// part: slow noise hides nothing here. About the number of poses for the truth.
+  PerAxis<double> power{};
+};
+
 /// Leaves blocks of poses out of fits that share their measured means and noise.
 class Heldout {
  public:
@@ -13,12 +21,11 @@ class Heldout {
   Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
           const PoseWhitening& whitening);
 
-  /// Residuals, V, of each axis's poses against the fit to all poses outside their block (all three
-  /// axes of a block are left out together), to first order in the parameters, without refitting.
-  /// One vector of n per axis for each partition; poses in no block are NaN. `fit` was made with
-  /// the same whitening.
-  std::vector<PerAxis<Eigen::VectorXd>> residuals_V(const EnlargedFit& fit,
-                                                    const std::vector<Blocks>& partitions) const;
+  /// Each axis's poses against the fit to all poses outside their block (all three axes of a block
+  /// are left out together), to first order in the parameters, without refitting; one for each
+  /// partition. `fit` was made with the same whitening.
+  std::vector<LeftOut> leave_out(const EnlargedFit& fit,
+                                 const std::vector<Blocks>& partitions) const;
 
  private:
   const VisitLog& log_;

@@ -20,7 +20,7 @@ std::vector<Candidate> likeliest(const SearchModel& model, const CandidateList& 
   if (list.candidates.size() <= kFew) return list.candidates;
   const CandidateResponses beside =
       candidate_responses(model.input().log, list, model.stage().whitening, fit.parameters);
-  const Eigen::VectorXd gains = CandidateGains(beside, fit).of(fit.whitened_residual);
+  const Eigen::VectorXd gains = CandidateGains(beside, fit).of_residual();
   std::vector<std::size_t> order(list.candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) {
@@ -32,10 +32,10 @@ std::vector<Candidate> likeliest(const SearchModel& model, const CandidateList& 
 }
 
 /// One candidate in the place of the `instances` of the candidate `repeated`, whose parameters
-/// are `p`; of all that could be one, so many were looked at.
+/// are `p`; of all that could be one, so many were looked at; noise may do as well so often.
 bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instances,
                     const Candidate& repeated, const std::vector<std::vector<double>>& p,
-                    double looks) {
+                    double looks, double false_alarm) {
   std::optional<EnlargedFit> without;  // most findings hint at nothing
   const Effect* tried = nullptr;
   std::optional<SearchModel::Entry> best;
@@ -61,7 +61,7 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
       if (!with.determined || cost >= best_cost) continue;
       const double p_value = p_of_search(
           log_chi_squared_tail(without->chi2 - with.chi2, static_cast<double>(dof)), looks);
-      if (p_value > model.options().false_alarm) continue;
+      if (p_value > false_alarm) continue;
       best_cost = cost;
       best = {c, p_value, with.parameters};
     }
@@ -83,21 +83,29 @@ std::vector<std::size_t> of_regular_steps(const SearchModel& model, std::size_t 
   }
   return found;
 }
+/// Whether the readings of an axis hang on where its codes change.
+bool has_edges(const SearchModel& model, std::size_t axis) {
+  return model.stage().coarse[axis] || model.stage().crossing_V2[axis].size() > 0 ||
+         !model.input().log.codes[axis].stuck_bits.empty();
+}
 bool put_train_in_place_of(SearchModel& model, const std::vector<std::size_t>& instances,
                            std::size_t axis) {
   constexpr double kRefined = 1.3;  // by which a train may gain more when its edges move
+  const SearchOptions& options = model.options();
+  const double false_alarm =
+      has_edges(model, axis) ? options.false_alarm_of_train_at_edges : options.false_alarm;
   const EnlargedFit without = model.fit_without(instances);
   if (!without.determined) return false;
   const auto comb = regular_steps(model.list(), model.responses(), without, axis);
   if (!comb) return false;
   const double looks = static_cast<double>(kAxisCount) * comb->looks;
-  if (p_of_search(log_chi_squared_tail(kRefined * comb->gain, 1), looks) >
-      model.options().false_alarm)
+  if (p_of_search(log_chi_squared_tail(kRefined * comb->gain, 1), looks) > false_alarm)
     return false;
   const double size = comb->size, up_s = comb->first_up_s;
   return replace_in_one(
       model, instances, model.list().candidates[comb->first_step],
-      {{size, up_s}, {size, up_s + comb->period_s}, {-size, up_s + comb->width_s}}, looks);
+      {{size, up_s}, {size, up_s + comb->period_s}, {-size, up_s + comb->width_s}}, looks,
+      false_alarm);
 }
 
 }  // namespace
@@ -121,7 +129,8 @@ void tell_in_one(SearchModel& model) {
       instances.push_back(l);
       p.push_back(model.stage().fit.parameters.effects[l].p);
     }
-    if (replace_in_one(model, instances, first, p, model.looks())) return;
+    if (replace_in_one(model, instances, first, p, model.looks(), model.options().false_alarm))
+      return;
   }
 }
 

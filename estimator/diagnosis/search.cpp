@@ -27,6 +27,22 @@ class Search {
     for (std::size_t c = 0; c < list_.candidates.size(); ++c)
       if (model_.is_certain(list_.candidates[c]) && !is_proven_otherwise(list_.candidates[c]))
         adopt_proven(c);
+    grow();
+    constexpr int kMostNamings = 3;
+    for (int k = 0; k < kMostNamings && name_unlisted(model_); ++k) {
+      model_.drop_superfluous();
+      grow();
+    }
+    constexpr int kMostExchanges = 4;
+    for (int k = 0; k < kMostExchanges && exchange_one(model_); ++k) model_.drop_superfluous();
+    SearchResult result = model_.take_result();
+    result.p_best_rest = p_best_rest_;
+    return result;
+  }
+
+ private:
+  /// One effect after the other, until nothing is found.
+  void grow() {
     // Where the best of the slow ones is superfluous as soon as it is there, so are the others.
     bool worth_slow_look = true;
     // A train that takes the place of another could be followed by that again.
@@ -43,14 +59,8 @@ class Search {
       tell_in_one(model_);
       if (!found) worth_slow_look = model_.size() > before;
     }
-    constexpr int kMostExchanges = 4;
-    for (int k = 0; k < kMostExchanges && exchange_one(model_); ++k) model_.drop_superfluous();
-    SearchResult result = model_.take_result();
-    result.p_best_rest = p_best_rest_;
-    return result;
   }
 
- private:
   /// What the codes prove joins the model.
   void adopt_proven(std::size_t candidate) {
     constexpr double kProven = 1e-300;  // what the codes prove needs no search
@@ -73,7 +83,7 @@ class Search {
   /// Adds the best candidate if the search as a whole would not often find as much in noise.
   bool add_one() {
     const CandidateGains gains(model_.responses(), model_.stage().fit);
-    const Eigen::VectorXd first_order = gains.of(model_.stage().fit.whitened_residual).col(0);
+    const Eigen::VectorXd first_order = gains.of_residual();
     std::vector<Scored> ranked = screen(list_, gains, first_order);
     std::erase_if(ranked, [&](const Scored& s) {
       const Candidate& c = list_.candidates[s.candidate];

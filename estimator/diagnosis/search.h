@@ -21,6 +21,9 @@ struct SearchOptions {
   /// positions and is slow when they are, less.
   double false_alarm_of_slow = 3e-4;
   double false_alarm_of_slow_when_coarse = 1e-5;
+  /// Of a train of pulses where readings hang on the edges of codes: it gathers whatever is odd at
+  /// some visits, which is not Gaussian there.
+  double false_alarm_of_train_at_edges = 1e-6;
   int replicates = 150;  ///< of simulated noise, for the look-elsewhere correction
   std::size_t max_effects = 6;
 };

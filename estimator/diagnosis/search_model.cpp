@@ -80,7 +80,15 @@ double SearchModel::log_p_of(std::size_t candidate, double gain, int dof,
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if ((after[i] - before[i]).lpNorm<Eigen::Infinity>() > input_.log.step_V(i))
       return log_chi_squared_tail(gain, dof);
-  return std::log(std::max(f_tail(gain / dof, dof, kDofOfCoarseReadings), 1e-300));
+  // The axes round independently of each other: Fisher's sum of their log-probabilities.
+  const Eigen::Index n = std::ssize(input_.log.visits);
+  double sum = 0;
+  for (Eigen::Index row = 0; row < mean_rows(input_.log); row += n) {
+    const double of_axis = stage_.fit.whitened_residual.segment(row, n).squaredNorm() -
+                           with.whitened_residual.segment(row, n).squaredNorm();
+    if (of_axis > 0) sum -= 2 * std::log(f_tail(of_axis, 1, kDofOfCoarseReadings));
+  }
+  return log_chi_squared_tail(sum, 2.0 * kAxisCount);
 }
 
 EnlargedFit SearchModel::fit(const EnlargedParameters& parameters) const {
@@ -211,10 +219,17 @@ void SearchModel::look_closer() {
 bool SearchModel::add(const Entry& with) { return exchange({}, with); }
 
 bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry& with) {
-  if (!adopt(with.parameters)) return false;
+  return exchange(effects, std::vector{with});
+}
+
+bool SearchModel::exchange(const std::vector<std::size_t>& effects,
+                           const std::vector<Entry>& with) {
+  if (!adopt(with.back().parameters)) return false;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k) forget(*k);
-  chosen_.push_back(with.candidate);
-  p_values_.push_back(with.p);
+  for (const Entry& newcomer : with) {
+    chosen_.push_back(newcomer.candidate);
+    p_values_.push_back(newcomer.p);
+  }
   look_closer();
   return true;
 }

@@ -73,6 +73,8 @@ class SearchModel {
   /// says whether it did: with one more effect; with one in the place of some (ascending).
   bool add(const Entry& with);
   bool exchange(const std::vector<std::size_t>& effects, const Entry& with);
+  /// With several, of which the last one's model holds all.
+  bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
   /// What a newcomer has made superfluous goes.
   void drop_superfluous();
 
