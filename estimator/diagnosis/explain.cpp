@@ -166,6 +166,28 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
   }
 }
 
+/// The covariance of the free parameters with what the ranges of the others add to it, to first
+/// order: where the steps of a converter begin moves the level of the axis. `fit` of `found` has
+/// its covariance under the noise.
+Eigen::MatrixXd with_allowance_for_ranges(const VisitLog& log, const SearchResult& found,
+                                          Eigen::MatrixXd covariance) {
+  const EnlargedFit& fit = found.fit;
+  const Eigen::VectorXd predicted_V = predict_stacked_V(log, fit.parameters);
+  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
+    const ActiveEffect& active = fit.parameters.effects[e];
+    for (auto& p : active.effect->one_deviation_away(log, active.axis, active.p)) {
+      EnlargedParameters away = fit.parameters;
+      away.effects[e].p = std::move(p);
+      const Eigen::MatrixXd change =
+          found.whitening.apply(predict_stacked_V(log, away) - predicted_V);
+      const Eigen::VectorXd shift =
+          fit.covariance * (fit.whitened_jacobian.transpose() * change.col(0));
+      covariance += shift * shift.transpose();
+    }
+  }
+  return covariance;
+}
+
 }  // namespace
 
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -199,7 +221,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
-  found.fit.covariance = with_allowance_for_noise(search, found, jacobian);
+  found.fit.covariance =
+      with_allowance_for_ranges(log, found, with_allowance_for_noise(search, found, jacobian));
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);

@@ -26,7 +26,7 @@ class Quantization final : public Effect {
   double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {
     if (k != 0) return 0;
-    if (log.codes[axis].coarser_lattice) return log.codes[axis].coarser_lattice->u_step_V;
+    if (log.codes[axis].coarser_lattice) return log.codes[axis].coarser_lattice->u_step_V();
     if (!is_finer(log, p[0])) return 0;
     // Rectangular between the neighbours that were looked at.
     return kApart * p[0] * p[0] / (log.highest_V[axis] - log.lowest_V[axis]) / std::numbers::sqrt3;
@@ -51,9 +51,27 @@ class Quantization final : public Effect {
     const double noise_V = std::max(log.input_sd_V[axis], effect::kLeastNoise * lattice->step_V);
     return {{{lattice->step_V, lattice->origin_V, noise_V}}};
   }
-  // Other finer steps of which the waves look alike.
+  std::vector<std::vector<double>> one_deviation_away(const VisitLog& log, std::size_t axis,
+                                                      const std::vector<double>& p) const override {
+    std::vector<std::vector<double>> away;
+    if (!log.codes[axis].coarser_lattice) return away;
+    for (const auto& [step_V, origin_V] : log.codes[axis].coarser_lattice->deviation)
+      away.push_back({p[0] + step_V, p[1] + origin_V, p[2]});
+    return away;
+  }
+  // Other lattices that the codes allow, or other finer steps of which the waves look alike.
   std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
                                  const Hypothesis& found) const override {
+    if (const auto& lattice = log.codes[axis].coarser_lattice) {
+      std::vector<Hypothesis> others;
+      const auto& [first, second] = lattice->deviation;
+      for (const double a : {-1.5, -0.75, 0.0, 0.75, 1.5})
+        for (const double b : {-1.5, -0.75, 0.0, 0.75, 1.5})
+          others.push_back(
+              {{lattice->step_V + a * first.step_V + b * second.step_V,
+                lattice->origin_V + a * first.origin_V + b * second.origin_V, found.p[2]}});
+      return others;
+    }
     if (!shows_finer_step(log, axis)) return {};
     const double turns = log.adc->lsb_V() / found.p[0];  // from one edge to the next
     const double part = std::abs(std::remainder(turns, 1));
@@ -155,9 +173,9 @@ class Quantization final : public Effect {
   static double reading_V(const TermInput& input, const double* p, double point) {
     const double at_V = p[1] + p[0] * point;
     const auto& lattice = input.log.codes[input.axis].coarser_lattice;
-    if (lattice && point >= 0 && point < static_cast<double>(lattice->second_rounding_V.size())) {
-      const double second_V = lattice->second_rounding_V[static_cast<std::size_t>(point)];
-      if (!std::isnan(second_V)) return at_V + second_V;
+    if (lattice && point >= 0 && point < static_cast<double>(lattice->reading_V.size())) {
+      const double seen_V = lattice->reading_V[static_cast<std::size_t>(point)];
+      if (!std::isnan(seen_V)) return seen_V;
     }
     const auto& adc = input.log.adc;
     return adc ? adc->min_V + adc->lsb_V() * std::round((at_V - adc->min_V) / adc->lsb_V()) : at_V;

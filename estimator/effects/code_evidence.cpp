@@ -1,8 +1,11 @@
 #include "estimator/effects/code_evidence.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "estimator/noise/chi_squared.h"
 
@@ -138,6 +141,64 @@ std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const
   return dwells;
 }
 
+namespace {
+
+/// Lines through intervals, (height at zero, slope), as the polygon of all of them.
+using Polygon = std::vector<Eigen::Vector2d>;
+
+/// The part of a convex polygon where normal·x ≤ bound.
+Polygon clipped(const Polygon& polygon, const Eigen::Vector2d& normal, double bound) {
+  Polygon left;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Eigen::Vector2d &here = polygon[k], &next = polygon[(k + 1) % polygon.size()];
+    const double above_here = normal.dot(here) - bound, above_next = normal.dot(next) - bound;
+    if (above_here <= 0) left.push_back(here);
+    if ((above_here < 0 && above_next > 0) || (above_here > 0 && above_next < 0))
+      left.push_back(here + (next - here) * (above_here / (above_here - above_next)));
+  }
+  return left;
+}
+
+/// Mean of the lines that pass each x within `half` of its y, and the lower factor of their
+/// covariance, all of them equally likely; `near` where there are none.
+struct FeasibleLine {
+  Eigen::Vector2d mean;
+  Eigen::Matrix2d root_covariance = Eigen::Matrix2d::Zero();
+};
+FeasibleLine feasible_line(const std::vector<double>& x, const std::vector<double>& y,
+                           const Eigen::Vector2d& near, double half) {
+  const double reach = 2, slope_reach = 2 / std::max(1.0, x.back());
+  Polygon lines;
+  for (const auto& [a, b] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+    lines.push_back(near + Eigen::Vector2d(a * reach, b * slope_reach));
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    lines = clipped(lines, {1, x[k]}, y[k] + half);
+    lines = clipped(lines, {-1, -x[k]}, half - y[k]);
+  }
+  FeasibleLine result{near};
+  if (lines.size() < 3) return result;
+  // Area, first and second moments of the triangles about the first corner.
+  double area = 0;
+  Eigen::Vector2d first = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d second = Eigen::Matrix2d::Zero();
+  for (std::size_t k = 1; k + 1 < lines.size(); ++k) {
+    const Eigen::Vector2d u = lines[k] - lines[0], v = lines[k + 1] - lines[0], sum = u + v;
+    const double triangle = 0.5 * std::abs(u(0) * v(1) - u(1) * v(0));
+    area += triangle;
+    first += triangle / 3 * sum;
+    second += triangle / 12 * (u * u.transpose() + v * v.transpose() + sum * sum.transpose());
+  }
+  if (!(area > 0)) return result;
+  const Eigen::Vector2d off = first / area;
+  result.mean = lines[0] + off;
+  result.root_covariance =
+      Eigen::LLT<Eigen::Matrix2d>(second / area - off * off.transpose()).matrixL();
+  if (!result.root_covariance.allFinite()) result.root_covariance.setZero();
+  return result;
+}
+
+}  // namespace
+
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
                                        std::size_t dwells_over_codes, double chance) {
   constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
@@ -218,19 +279,26 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
                             log_choices(range + 1, seen) +
                             static_cast<double>(dwells_over_codes) * std::log(0.5);
   if (log_chance > std::log(chance)) return {};
-  const double lsb_V = adc.lsb_V();
-  Lattice lattice{step * lsb_V,
-                  adc.min_V + lsb_V * (static_cast<double>(codes.front()) + fit(step).middle),
-                  (first - last + resolution * step) * lsb_V / std::sqrt(12.0),
-                  {}};
-  lattice.second_rounding_V.assign(static_cast<std::size_t>(std::lround(range / step)) + 2,
-                                   std::numeric_limits<double>::quiet_NaN());
+  const double lsb_V = adc.lsb_V(),
+               front_V = adc.min_V + lsb_V * static_cast<double>(codes.front());
+  const Fit middle = fit(step);
+  std::vector<double> points_seen, steps_seen;
   for (const std::int64_t code : codes) {
-    const double reading_V = adc.min_V + lsb_V * static_cast<double>(code);
-    const auto k = std::lround((reading_V - lattice.origin_V) / lattice.step_V);
-    lattice.second_rounding_V.at(static_cast<std::size_t>(k)) =
-        reading_V - lattice.origin_V - lattice.step_V * static_cast<double>(k);
+    steps_seen.push_back(static_cast<double>(code - codes.front()));
+    points_seen.push_back(std::round((steps_seen.back() - middle.middle) / step));
   }
+  const FeasibleLine line = feasible_line(points_seen, steps_seen, {middle.middle, step},
+                                          std::max(0.5, 0.5 * middle.spread));
+  Lattice lattice{lsb_V * line.mean(1), front_V + lsb_V * line.mean(0)};
+  for (std::size_t d = 0; d < 2; ++d) {
+    const Eigen::Vector2d off = lsb_V * line.root_covariance.col(static_cast<Eigen::Index>(d));
+    lattice.deviation.at(d) = {off(1), off(0)};
+  }
+  lattice.reading_V.assign(static_cast<std::size_t>(std::lround(range / step)) + 2,
+                           std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t c = 0; c < codes.size(); ++c)
+    lattice.reading_V.at(static_cast<std::size_t>(points_seen[c])) =
+        front_V + lsb_V * steps_seen[c];
   return lattice;
 }
 
@@ -253,8 +321,8 @@ CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& a
   else if (faults.stuck_bits.size() > 1 || faults.stuck_bits.front().bit > 0)
     faults.coarser_lattice.reset();
   else
-    faults.coarser_lattice = {
-        2 * adc.lsb_V(), adc.min_V + adc.lsb_V() * static_cast<double>(codes.front()), 0, {}};
+    faults.coarser_lattice = {2 * adc.lsb_V(),
+                              adc.min_V + adc.lsb_V() * static_cast<double>(codes.front())};
   return faults;
 }
 

@@ -1,6 +1,8 @@
 // What the codes of a converter show by themselves, whatever was measured with it.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -30,9 +32,16 @@ std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const A
 struct Lattice {
   double step_V = 0;
   double origin_V = 0;
-  double u_step_V = 0;  ///< standard uncertainty: neighbouring steps have points there, too
-  /// What the declared converter adds to each point from k = 0 on; NaN where it was not seen.
-  std::vector<double> second_rounding_V = {};
+  /// Steps and origins with their points there, too: both may be off together by the first or by
+  /// the second of these, independent of each other, one standard deviation each.
+  struct Offset {
+    double step_V = 0, origin_V = 0;
+  };
+  std::array<Offset, 2> deviation = {};
+  /// What the declared converter makes of each point from k = 0 on; NaN where it was not seen.
+  std::vector<double> reading_V = {};
+
+  double u_step_V() const { return std::hypot(deviation[0].step_V, deviation[1].step_V); }
 };
 
 /// In how many dwells of `set` the readings of an axis step over a code of `adc`, bits that are

@@ -105,6 +105,12 @@ class Effect {
                                     const std::vector<double>& /*p*/, std::size_t /*k*/) const {
     return 0;
   }
+  /// Index parameters that are known by a range only: `p` with all of them off together by one
+  /// standard deviation, once for each independent way.
+  virtual std::vector<std::vector<double>> one_deviation_away(
+      const VisitLog&, std::size_t /*axis*/, const std::vector<double>& /*p*/) const {
+    return {};
+  }
   /// Other parameters that may be true of a later set although `p` was found on `run`: they say
   /// the same of all of that, or concern how the head comes to the first pose of a set.
   virtual std::vector<std::vector<double>> left_open_by(const RunHistory& /*run*/,

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -71,6 +72,35 @@ TEST(CodeEvidence, AStepThatIsHardlyCoarserIsMeasured) {
     EXPECT_NEAR(lattice->step_V, step_V, 0.01 * step_V);
     EXPECT_LT(std::abs(std::remainder(-2.6 - lattice->origin_V, lattice->step_V)), 4e-4);
   }
+}
+
+// All lattices that give these codes are equally likely: the true one lies among them, as far off
+// as is stated.
+TEST(CodeEvidence, StepAndOriginAreKnownAsWellAsIsStated) {
+  const Adc twelve_bits{12, -5.0, 0.0};
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> step_of(2.6e-3, 6e-3), first_of(-2.602, -2.6);
+  constexpr int kLattices = 200;
+  double sum_first = 0, sum_second = 0, worst = 0;
+  for (int k = 0; k < kLattices; ++k) {
+    const double step_V = step_of(random), first_V = first_of(random);
+    std::vector<double> u_V;
+    for (int i = 0; i < 3000; ++i)
+      u_V.push_back(
+          rounded(first_V + std::round(2.2e-5 * i / step_V) * step_V, twelve_bits.lsb_V()));
+    const auto lattice = coarser_lattice(codes_seen(u_V, twelve_bits), twelve_bits);
+    ASSERT_TRUE(lattice) << step_V;
+    const auto& [both, alone] = lattice->deviation;
+    ASSERT_EQ(alone.origin_V, 0);
+    const double first = std::remainder(first_V - lattice->origin_V, step_V) / both.origin_V;
+    const double second = (step_V - lattice->step_V - first * both.step_V) / alone.step_V;
+    sum_first += first * first;
+    sum_second += second * second;
+    worst = std::max({worst, std::abs(first), std::abs(second)});
+  }
+  EXPECT_NEAR(sum_first / kLattices, 1, 0.35);
+  EXPECT_NEAR(sum_second / kLattices, 1, 0.35);
+  EXPECT_LT(worst, 4);
 }
 
 TEST(CodeEvidence, DwellsThatStepOverCodesProveALatticeOfFewPoints) {
