@@ -152,12 +152,14 @@ std::vector<Place> places_of(const std::vector<const Effect*>& effects) {
 
 std::vector<Place> places_of(const EnlargedParameters& model) {
   std::vector<const Effect*> effects;
+  effects.reserve(model.effects.size());
   for (const ActiveEffect& active : model.effects) effects.push_back(active.effect);
   return places_of(effects);
 }
 
 std::vector<Place> places_of(const std::vector<Evidence>& evidence) {
   std::vector<const Effect*> effects;
+  effects.reserve(evidence.size());
   for (const Evidence& found : evidence) effects.push_back(found.candidate.effect);
   return places_of(effects);
 }
