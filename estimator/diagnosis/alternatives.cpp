@@ -81,7 +81,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
 
   const auto usable = [&](const Candidate& candidate) {
     // A smooth term can imitate anything; it is no rival that could be looked for.
-    if (candidate.handicap > 0 || same_effect(candidate, found)) return false;
+    if (!candidate.has_name() || same_effect(candidate, found)) return false;
     return std::none_of(result.evidence.begin(), result.evidence.end(),
                         [&](const Evidence& e) { return same_effect(e.candidate, candidate); });
   };

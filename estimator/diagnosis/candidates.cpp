@@ -75,7 +75,7 @@ CandidateList all_candidates(const VisitLog& log,
     add_candidates(list, log, *list.owned.back(), kUnnamed);
   }
   std::erase_if(list.candidates, [&](const Candidate& candidate) {
-    return candidate.handicap > 0 && candidate.effect->subject() == Subject::sensor &&
+    return !candidate.has_name() && candidate.effect->subject() == Subject::sensor &&
            is_nothing_but_steps(log, candidate.axis);
   });
   for (const auto& effect : own) {

@@ -20,6 +20,7 @@ struct Candidate {
   /// Single readings of a coarse converter stray further than Gaussian noise does.
   bool of_one_coarse_reading = false;
 
+  bool has_name() const { return handicap == 0; }
   ActiveEffect active() const { return activate(*effect, axis, hypothesis); }
 };
 
@@ -85,8 +86,8 @@ class CandidateGains {
 
   /// By how much each candidate would lower the sum of squares of the fit's residual.
   Eigen::VectorXd of_residual() const { return of(residual_).col(0); }
-  /// The same of `whitened` (stacked rows, free of
-  /// what the model's parameters take up; one column a replicate): candidates × columns.
+  /// The same of `whitened` (stacked rows, free of what the model's parameters take up; one column
+  /// a replicate): candidates × columns.
   Eigen::MatrixXd of(const Eigen::MatrixXd& whitened) const;
   /// Free directions of a candidate; 0 when the model absorbs it.
   int dof(std::size_t candidate) const { return static_cast<int>(transform_[candidate].rows()); }

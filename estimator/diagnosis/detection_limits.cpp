@@ -120,7 +120,7 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
   std::map<Place, double> log_p;
   for (std::size_t c = 0; c < list.candidates.size(); ++c) {
     const Candidate& candidate = list.candidates[c];
-    if (candidate.handicap > 0 || beside.is_in_model(candidate)) continue;
+    if (!candidate.has_name() || beside.is_in_model(candidate)) continue;
     const Eigen::MatrixXd transform = beside.transform(c);
     if (transform.rows() > 0) {
       double& strongest = log_p[place_of(candidate)];

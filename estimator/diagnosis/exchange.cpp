@@ -69,15 +69,13 @@ bool exchange_one(SearchModel& model) {
 
 namespace {
 
-bool has_name(const Candidate& candidate) { return candidate.handicap == 0; }
-
 /// What has no name: all of it, then what has the same driver and acts on the same, part by part.
 std::vector<std::vector<std::size_t>> unlisted_of(const SearchModel& model) {
   std::vector<std::vector<std::size_t>> subsets;
   std::vector<std::size_t> all;
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& chosen = model.candidate(k);
-    if (has_name(chosen)) continue;
+    if (chosen.has_name()) continue;
     all.push_back(k);
     const auto like_it = std::find_if(subsets.begin(), subsets.end(), [&](const auto& subset) {
       const Candidate& other = model.candidate(subset.front());
@@ -102,7 +100,7 @@ Named named_candidates(SearchModel& model) {
   Named named;
   const std::vector<Candidate>& candidates = model.list().candidates;
   for (std::size_t c = 0; c < candidates.size(); ++c)
-    if (has_name(candidates[c])) named.index.push_back(c);
+    if (candidates[c].has_name()) named.index.push_back(c);
   for (const std::size_t c : named.index) named.list.candidates.push_back(candidates[c]);
   named.list.family_size = model.list().family_size;
   named.responses = some_of(model.responses(), named.index);
@@ -116,8 +114,7 @@ struct Next {
   EnlargedFit fit;
 };
 std::optional<Next> likeliest_beside(const SearchModel& model, const Named& named,
-                                     const EnlargedFit& fit,
-                                     const std::vector<std::size_t>& replaced) {
+                                     const EnlargedFit& fit) {
   constexpr std::size_t kMostRefined = 4;
   const CandidateGains gains(named.responses, fit);
   std::optional<Next> best;
@@ -129,8 +126,7 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
         fit.parameters.effects.begin(), fit.parameters.effects.end(), [&](const ActiveEffect& e) {
           return e.effect == candidate.effect && e.axis == candidate.axis;
         });
-    if (model.is_chosen_beside(replaced, candidate) || (is_there && !candidate.effect->repeats()))
-      continue;
+    if (model.is_certain(candidate) || (is_there && !candidate.effect->repeats())) continue;
     if (refined++ == kMostRefined) break;
     const std::size_t index = named.index[s.candidate];
     EnlargedFit with = model.fit_with(fit.parameters, candidate.active());
@@ -156,7 +152,7 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
   double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kClearly, price = 0;
   EnlargedFit fit = model.fit_without(subset);
   while (fit.determined && names.size() < most) {
-    std::optional<Next> next = likeliest_beside(model, named, fit, subset);
+    std::optional<Next> next = likeliest_beside(model, named, fit);
     if (!next) break;
     price += model.price(next->entry.candidate);
     names.push_back(std::move(next->entry));
