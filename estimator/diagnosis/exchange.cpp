@@ -38,8 +38,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     if (!with.determined) continue;
     const double cost = with.chi2 + model.price(index);
     if (!(cost < model.stage().fit.chi2 + spent - kClearly)) continue;
-    const double p =
-        model.p_of(model.log_p_of(index, without.chi2 - with.chi2, gains.dof(index), with));
+    const double p = model.p_of(model.log_p_of(index, without, with, gains.dof(index)));
     if (p <= model.options().false_alarm) exchanges.push_back({index, p, with.parameters});
   }
   return exchanges;
@@ -131,7 +130,7 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
     const std::size_t index = named.index[s.candidate];
     EnlargedFit with = model.fit_with(fit.parameters, candidate.active());
     if (!with.determined) continue;
-    const double log_p = model.log_p_of(index, fit.chi2 - with.chi2, s.dof, with);
+    const double log_p = model.log_p_of(index, fit, with, s.dof);
     const double score = log_p + (s.score - s.log_p);
     if (score >= best_score) continue;
     best_score = score;

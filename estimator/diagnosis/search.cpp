@@ -124,8 +124,8 @@ class Search {
       const Scored& s = ranked[k];
       const EnlargedFit& with = fits[k];
       if (!with.determined) continue;
-      const double log_p = model_.log_p_of(s.candidate, model_.stage().fit.chi2 - with.chi2,
-                                           gains.dof(s.candidate), with);
+      const double log_p =
+          model_.log_p_of(s.candidate, model_.stage().fit, with, gains.dof(s.candidate));
       const double score = log_p + (s.score - s.log_p);
       if (score < winner_score) {
         winner = &s;
@@ -175,9 +175,8 @@ class Search {
         const EnlargedFit with =
             model_.fit_with(without.parameters, list_.candidates[candidate].active());
         if (!with.determined) continue;
-        const double gained = model_.stage().fit.chi2 - with.chi2;
         const double p =
-            model_.p_of(model_.log_p_of(candidate, gained, gains.dof(candidate), with));
+            model_.p_of(model_.log_p_of(candidate, model_.stage().fit, with, gains.dof(candidate)));
         if (p <= options_.false_alarm && model_.exchange({k}, {candidate, p, with.parameters}))
           return true;
       }

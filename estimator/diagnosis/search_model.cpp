@@ -72,19 +72,20 @@ double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
   return sum;
 }
 
-double SearchModel::log_p_of(std::size_t candidate, double gain, int dof,
-                             const EnlargedFit& with) const {
-  if (!list_.candidates[candidate].of_one_coarse_reading) return log_chi_squared_tail(gain, dof);
-  const auto before = predict_means_V(input_.log, stage_.fit.parameters);
-  const auto after = predict_means_V(input_.log, with.parameters);
+double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
+                             const EnlargedFit& with, int dof) const {
+  const double log_p_gaussian = log_chi_squared_tail(before.chi2 - with.chi2, dof);
+  if (!list_.candidates[candidate].of_one_coarse_reading) return log_p_gaussian;
+  const auto before_V = predict_means_V(input_.log, before.parameters);
+  const auto with_V = predict_means_V(input_.log, with.parameters);
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    if ((after[i] - before[i]).lpNorm<Eigen::Infinity>() > input_.log.step_V(i))
-      return log_chi_squared_tail(gain, dof);
+    if ((with_V[i] - before_V[i]).lpNorm<Eigen::Infinity>() > input_.log.step_V(i))
+      return log_p_gaussian;
   // The axes round independently of each other: Fisher's sum of their log-probabilities.
   const Eigen::Index n = std::ssize(input_.log.visits);
   double sum = 0;
   for (Eigen::Index row = 0; row < mean_rows(input_.log); row += n) {
-    const double of_axis = stage_.fit.whitened_residual.segment(row, n).squaredNorm() -
+    const double of_axis = before.whitened_residual.segment(row, n).squaredNorm() -
                            with.whitened_residual.segment(row, n).squaredNorm();
     if (of_axis > 0) sum -= 2 * std::log(f_tail(of_axis, 1, kDofOfCoarseReadings));
   }

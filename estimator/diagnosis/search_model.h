@@ -41,9 +41,11 @@ class SearchModel {
   double p_of(double log_p_local) const;
   /// What counts as significant among the slow candidates of each axis.
   PerAxis<double> false_alarm_of_slow() const;
-  /// log of the probability that noise alone gives a candidate this gain. A single reading of a
-  /// coarse converter strays further than Gaussian noise, but by no more than a step.
-  double log_p_of(std::size_t candidate, double gain, int dof, const EnlargedFit& with) const;
+  /// log of the probability that noise alone gives a candidate what it gains over the fit `before`
+  /// it. A single reading of a coarse converter strays further than Gaussian noise, but by no more
+  /// than a step. Both fits with the noise as it stands.
+  double log_p_of(std::size_t candidate, const EnlargedFit& before, const EnlargedFit& with,
+                  int dof) const;
   /// What a candidate must gain in χ² to be worth its amplitudes, its choice among many (which its
   /// shapes are part of) and its want of a name.
   double price(std::size_t candidate) const;
