@@ -134,7 +134,8 @@ Eigen::Matrix4d with_allowance_for_noise(const Experiment& experiment, const Axi
 void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   if (!experiment.input.description.adc) return;
   auto quantized = quantized_axis(experiment.input.run, experiment.A, work.positioning_V2,
-                                  *experiment.input.description.adc, axis);
+                                  Eigen::VectorXd::Zero(work.y.size()),
+                                  scale_of(*experiment.input.description.adc), axis);
   if (!quantized) return;
   // Quantization and white noise are those of single readings: in the intervals already.
   const Eigen::Index n = work.y.size();

@@ -370,6 +370,7 @@ void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd>
   Eigen::Index first = 0;
   while (first < means_V.rows() && (means_V.row(first).array() == 0).all()) ++first;
   const Eigen::Index rest = means_V.rows() - first;
+  if (rest == 0) return;  // OpenBLAS complains of empty products
   // So do the columns of a Jacobian that belong to other axes.
   std::vector<Eigen::Index> seen;
   for (Eigen::Index j = 0; j < means_V.cols(); ++j)

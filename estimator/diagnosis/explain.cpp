@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/diagnosis/code_estimate.h"
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/heldout.h"
@@ -166,24 +167,34 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
   }
 }
 
-/// The covariance of the free parameters with what the ranges of the others add to it, to first
-/// order: where the steps of a converter begin moves the level of the axis. `fit` of `found` has
-/// its covariance under the noise.
-Eigen::MatrixXd with_allowance_for_ranges(const VisitLog& log, const SearchResult& found,
-                                          Eigen::MatrixXd covariance) {
-  const EnlargedFit& fit = found.fit;
-  const Eigen::VectorXd predicted_V = predict_stacked_V(log, fit.parameters);
-  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
-    const ActiveEffect& active = fit.parameters.effects[e];
+/// By how much the readings are others where what the search chose, like where the steps of a
+/// converter begin, is one standard deviation away, each independent of the others; stacked.
+std::vector<Eigen::VectorXd> choice_deviations_V(const VisitLog& log,
+                                                 const EnlargedParameters& model) {
+  std::vector<Eigen::VectorXd> all_V;
+  const Eigen::VectorXd predicted_V = predict_stacked_V(log, model);
+  for (std::size_t e = 0; e < model.effects.size(); ++e) {
+    const ActiveEffect& active = model.effects[e];
     for (auto& p : active.effect->one_deviation_away(log, active.axis, active.p)) {
-      EnlargedParameters away = fit.parameters;
+      EnlargedParameters away = model;
       away.effects[e].p = std::move(p);
-      const Eigen::MatrixXd change =
-          found.whitening.apply(predict_stacked_V(log, away) - predicted_V);
-      const Eigen::VectorXd shift =
-          fit.covariance * (fit.whitened_jacobian.transpose() * change.col(0));
-      covariance += shift * shift.transpose();
+      all_V.push_back(predict_stacked_V(log, away) - predicted_V);
     }
+  }
+  return all_V;
+}
+
+/// The covariance of the free parameters with what the noise and the choices of the search add to
+/// it, to first order. `deviations_V`: stacked, of the readings.
+Eigen::MatrixXd with_allowances(const SearchInput& search, const SearchResult& found,
+                                const Eigen::MatrixXd& jacobian,
+                                const std::vector<Eigen::VectorXd>& deviations_V) {
+  const EnlargedFit& fit = found.fit;
+  Eigen::MatrixXd covariance = with_allowance_for_noise(search, found, jacobian);
+  for (const Eigen::VectorXd& deviation_V : deviations_V) {
+    const Eigen::VectorXd shift = fit.covariance * (fit.whitened_jacobian.transpose() *
+                                                    found.whitening.apply(deviation_V).col(0));
+    covariance += shift * shift.transpose();
   }
   return covariance;
 }
@@ -221,8 +232,16 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
-  found.fit.covariance =
-      with_allowance_for_ranges(log, found, with_allowance_for_noise(search, found, jacobian));
+  auto codes = estimate_from_codes(search, input.input.run, found);
+  if (codes) {
+    SearchResult& before = codes->before_rounding;
+    before.fit.covariance = with_allowances(
+        search, before, prediction_jacobian(log, before.fit.parameters), codes->deviation_V);
+    static_cast<EnlargedEstimate&>(found.fit) = codes->with_rounding(before.fit, found);
+  } else {
+    found.fit.covariance =
+        with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
+  }
   Diagnosis diagnosis =
       describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, gains, diagnosis);
@@ -230,18 +249,21 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
     diagnosis.history = history_of(log);
 
+  // What certifies is estimated from these readings.
+  const SearchResult& estimated = codes ? codes->before_rounding : found;
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
+  const auto estimated_V = predict_means_V(log, estimated.fit.parameters);
   EnlargedParameters bare = found.fit.parameters;
   bare.effects.clear();
   const auto twelve_V = predict_means_V(log, bare);
   const Gravity& gravity = input.input.description.gravity;
 
   const auto n = std::ssize(input.poses);
-  const auto joint = joint_estimate(input, search, found);
+  const auto joint = joint_estimate(input, search, estimated);
   if (joint) {
-    EnlargedEstimate filter{found.fit.parameters, joint->covariance};
+    EnlargedEstimate filter{estimated.fit.parameters, joint->covariance};
     filter.parameters.set_free_values(joint->value);
-    attach_filter(log, filter, diagnosis);
+    attach_filter(log, codes ? codes->with_rounding(filter, found) : filter, diagnosis);
   }
   PerAxis<bool> concerned{};
   for (const ActiveEffect& active : found.fit.parameters.effects)
@@ -253,11 +275,11 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     const double factor = mps2_per_V(found.fit.parameters, i);
     result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
     const auto first = 4 * static_cast<Eigen::Index>(i);
-    result.final.ekf[i] =
-        with_gravity(joint ? AxisEstimate{joint->value.segment<4>(first),
-                                          joint->covariance.block<4, 4>(first, first)}
-                           : filter_estimate(input, search, found, predicted_V[i] - twelve_V[i], i),
-                     gravity);
+    result.final.ekf[i] = with_gravity(
+        joint ? AxisEstimate{joint->value.segment<4>(first),
+                             joint->covariance.block<4, 4>(first, first)}
+              : filter_estimate(input, search, estimated, estimated_V[i] - twelve_V[i], i),
+        gravity);
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
     const Eigen::VectorXd residual_mps2 = factor * (mean_V[i] - predicted_V[i]);
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);

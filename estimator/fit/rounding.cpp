@@ -90,6 +90,11 @@ bool is_coarse_against(double step_V, double sample_sd_V) {
          kNoTrace * step_V;
 }
 
+bool leaves_edges(double step_V, double sigma_V) {
+  constexpr double kSoftest = 0.15;
+  return sigma_V < kSoftest * step_V;
+}
+
 Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
                                      const Eigen::VectorXd& residual) {
   const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance);
@@ -109,10 +114,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
   const double full_V2 = rounding_variance(step_V, sigma_V);
   const double mean_white_V2 = recorded_V2 / samples_per_mean;
   RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
-  // Below this the staircase has edges: a mean says in which step the voltage lies and no more, and
-  // to first order there is nothing to undo.
-  constexpr double kSoftest = 0.15;
-  if (sigma_V < kSoftest * step_V) return result;
+  if (leaves_edges(step_V, sigma_V)) return result;
   const double before_V2 = mean_square(mean_V - expected_V);
   const double origin_V = 0.5 * (adc.min_V + adc.max_V);
   // How far the true mean is from the expected one blurs the bias; found by repetition.

@@ -99,15 +99,16 @@ TiltedMoments moments_of(const CodeCounts& codes, double sigma, double mean, dou
 class Propagation {
  public:
   Propagation(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
-              const Eigen::VectorXd& known_variance)
-      : A_(A), codes_(codes), known_(known_variance) {
+              const Eigen::VectorXd& known_variance, const Eigen::VectorXd& known)
+      : A_(A), codes_(codes), known_variance_(known_variance), known_(known) {
     mean_.resize(A.rows());
-    for (Eigen::Index k = 0; k < A.rows(); ++k) mean_(k) = codes[static_cast<std::size_t>(k)].mean;
+    for (Eigen::Index k = 0; k < A.rows(); ++k)
+      mean_(k) = codes[static_cast<std::size_t>(k)].mean - known(k);
     reset();
   }
 
   void reset() {
-    precision_ = (known_.array() + 1.0 / 12).inverse();
+    precision_ = (known_variance_.array() + 1.0 / 12).inverse();
     shift_ = precision_.cwiseProduct(mean_);
   }
 
@@ -130,7 +131,7 @@ class Propagation {
   }
 
   Eigen::VectorXd equivalent_variance() const { return precision_.cwiseInverse(); }
-  Eigen::VectorXd equivalent_mean() const { return shift_.cwiseQuotient(precision_); }
+  Eigen::VectorXd equivalent_mean() const { return known_ + shift_.cwiseQuotient(precision_); }
 
   Eigen::Vector4d value;
   Eigen::Matrix4d covariance;
@@ -147,9 +148,9 @@ class Propagation {
       if (!(free > 1e-9 / variance)) continue;  // this pose alone determines a direction
       const double cavity_variance = 1 / free;
       const double cavity_mean = cavity_variance * (mean / variance - shift_(k));
-      const double total = cavity_variance + known_(k) + scatter2;
+      const double total = cavity_variance + known_variance_(k) + scatter2;
       const TiltedMoments tilted =
-          moments_of(codes_[static_cast<std::size_t>(k)], sigma, cavity_mean, total);
+          moments_of(codes_[static_cast<std::size_t>(k)], sigma, known_(k) + cavity_mean, total);
       // The old site as it stands in the evidence …
       const double old_variance = 1 / precision_(k), old_mean = shift_(k) / precision_(k);
       const double spread = cavity_variance + old_variance;
@@ -158,7 +159,7 @@ class Propagation {
                   0.5 * from_cavity * from_cavity / spread + 0.5 * std::log(precision_(k)) -
                   0.5 * precision_(k) * from_fit * from_fit;
       // … and the new one: derivatives of the log mass by the mean.
-      const double slope = (tilted.mean - cavity_mean) / total;
+      const double slope = (tilted.mean - known_(k) - cavity_mean) / total;
       const double curvature = (1 - tilted.variance / total) / total;
       const double rest = 1 - curvature * cavity_variance;
       const double precision = std::max(curvature / std::max(rest, 1e-6), 1e-6);
@@ -172,8 +173,9 @@ class Propagation {
 
   const Eigen::MatrixXd& A_;
   const std::vector<CodeCounts>& codes_;
+  const Eigen::VectorXd& known_variance_;
   const Eigen::VectorXd& known_;
-  Eigen::VectorXd mean_;
+  Eigen::VectorXd mean_;       ///< of the codes, less what is known
   Eigen::VectorXd precision_;  ///< of the sites
   Eigen::VectorXd shift_;      ///< precision × mean of the sites
 };
@@ -184,12 +186,13 @@ struct Scales {
 };
 
 /// From the scatter inside the poses and, with single readings, from the residual.
-Scales first_guess(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes) {
+Scales first_guess(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
+                   const Eigen::VectorXd& known) {
   double square = 0, dof = 0;
   Eigen::VectorXd mean(A.rows());
   for (Eigen::Index k = 0; k < A.rows(); ++k) {
     const CodeCounts& pose = codes[static_cast<std::size_t>(k)];
-    mean(k) = pose.mean;
+    mean(k) = pose.mean - known(k);
     double readings = 0;
     for (const auto& [code, count] : pose.count) {
       square += count * (code - pose.mean) * (code - pose.mean);
@@ -212,43 +215,51 @@ Scales first_guess(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& code
 
 }  // namespace
 
+CodeScale scale_of(const Adc& adc) {
+  constexpr double kOffScale = 0.02;
+  return {.origin_V = 0.5 * (adc.min_V + adc.max_V),
+          .step_V = adc.lsb_V(),
+          .off_scale = kOffScale,
+          .lowest_V = adc.min_V,
+          .highest_V = adc.max_V - adc.lsb_V()};
+}
+
 std::optional<std::vector<CodeCounts>> count_codes(const SampleTable& samples,
                                                    const std::vector<Pose>& poses, std::size_t axis,
-                                                   const Adc& adc) {
-  constexpr double kOffGrid = 0.02;
-  const double middle_V = 0.5 * (adc.min_V + adc.max_V), step_V = adc.lsb_V();
-  const double half_range = std::ldexp(1.0, adc.bits - 1);
+                                                   const CodeScale& scale) {
+  const double first = (scale.lowest_V - scale.origin_V) / scale.step_V + 0.5;
+  const double last = (scale.highest_V - scale.origin_V) / scale.step_V - 0.5;
   std::vector<CodeCounts> all;
   all.reserve(poses.size());
   for (const Pose& pose : poses) {
     std::map<double, double> count;
     CodeCounts codes;
     for (std::size_t row = pose.first; row < pose.first + pose.count; ++row) {
-      const double exact = (samples.u_V[axis][row] - middle_V) / step_V;
+      const double exact = (samples.u_V[axis][row] - scale.origin_V) / scale.step_V;
       const double code = std::round(exact);
-      if (!(std::abs(exact - code) < kOffGrid)) return std::nullopt;
+      if (!(std::abs(exact - code) < scale.off_scale)) return std::nullopt;
       count[code] += 1;
       codes.mean += code / static_cast<double>(pose.count);
     }
     codes.count.assign(count.begin(), count.end());
-    codes.at_low_end = codes.count.front().first <= -half_range;
-    codes.at_high_end = codes.count.back().first >= half_range - 1;
+    codes.at_low_end = codes.count.front().first < first;
+    codes.at_high_end = codes.count.back().first > last;
     all.push_back(std::move(codes));
   }
   return all;
 }
 
 IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
-                          const Eigen::VectorXd& known_variance) {
+                          const Eigen::VectorXd& known_variance, const Eigen::VectorXd& known) {
   constexpr int kSearchSweeps = 6, kFinalSweeps = 40, kMostEvaluations = 64;
   constexpr double kLeastSigma = 0.002, kLeastScatter = 0.0003, kMost = 5;
-  const Scales guess = first_guess(A, codes);
+  const Scales guess = first_guess(A, codes, known);
   const bool single = std::all_of(codes.begin(), codes.end(), [](const CodeCounts& pose) {
     return pose.count.size() == 1 && pose.count.front().second < 2;
   });
 
   // Pattern search over both logarithms; with single readings they cannot be told apart.
-  Propagation search(A, codes, known_variance);
+  Propagation search(A, codes, known_variance, known);
   std::array<double, 2> at = {std::log(guess.sigma), std::log(kLeastScatter)};
   const auto evidence_of = [&](const std::array<double, 2>& x) {
     return search.run(std::exp(x[0]), std::exp(x[1]), kSearchSweeps);

@@ -20,11 +20,21 @@ struct CodeCounts {
   bool at_high_end = false;  ///< likewise above
 };
 
-/// Codes of all poses about the converter's middle. Nothing when the voltages are not those of its
-/// codes (to 2 % of a step), as with readings that were averaged or calibrated before.
+/// What a converter makes of a voltage: the nearest of origin_V + code·step_V.
+struct CodeScale {
+  double origin_V = 0;
+  double step_V = 0;
+  double off_scale = 0;                ///< how far a reading may be from its code, steps
+  double lowest_V = 0, highest_V = 0;  ///< first and last code of the converter
+};
+/// As declared; codes are counted from the middle of the span.
+CodeScale scale_of(const Adc& adc);
+
+/// Codes of all poses. Nothing when the voltages are not those of codes, as with readings that were
+/// averaged or calibrated before.
 std::optional<std::vector<CodeCounts>> count_codes(const SampleTable& samples,
                                                    const std::vector<Pose>& poses, std::size_t axis,
-                                                   const Adc& adc);
+                                                   const CodeScale& scale);
 
 /// n poses, everything in steps.
 struct IntervalFit {
@@ -39,12 +49,12 @@ struct IntervalFit {
   bool converged = false;
 };
 
-/// Parameters x of A·x (n × 4) given codes. Each pose's true output is A·x + e, e ~ N(0,
+/// Parameters x of A·x (n × 4) given codes. Each pose's true output is known + A·x + e, e ~ N(0,
 /// known_variance + scatter²) (positioning, model error: this is what keeps the intervals soft);
 /// each reading adds N(0, sigma²) and is rounded. The posterior under a flat prior is approximated
 /// by expectation propagation (Minka 2001): moments of one pose's exact likelihood at a time; sigma
 /// and scatter maximise the evidence. Preconditions: A has full rank, n > 4.
 IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
-                          const Eigen::VectorXd& known_variance);
+                          const Eigen::VectorXd& known_variance, const Eigen::VectorXd& known);
 
 }  // namespace plumbline

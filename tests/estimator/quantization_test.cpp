@@ -82,7 +82,8 @@ Errors errors_of(const Case& c, int trials) {
       const Eigen::Vector4d e = (estimate - truth) * kStep_mps2 * 1e3;
       return e.head<3>().squaredNorm() / 3 + e(3) * e(3);
     };
-    const IntervalFit fit = fit_intervals(A, codes, Eigen::VectorXd::Zero(324));
+    const IntervalFit fit =
+        fit_intervals(A, codes, Eigen::VectorXd::Zero(324), Eigen::VectorXd::Zero(324));
     EXPECT_TRUE(fit.converged);
     sum.least_squares += square(solve_least_squares(A, mean).x) / trials;
     sum.intervals += square(fit.value) / trials;
@@ -140,13 +141,58 @@ TEST(CountCodes, TakesOnlyVoltagesOfTheConverter) {
   for (auto& axis : samples.u_V)
     axis = {adc.volts(3), adc.volts(3), adc.volts(4), adc.volts(-2048)};
   const std::vector<Pose> poses = {{0, 0, 0, 0, 3}, {1, 10, 0, 3, 1}};
-  const auto codes = count_codes(samples, poses, 0, adc);
+  const auto codes = count_codes(samples, poses, 0, scale_of(adc));
   ASSERT_TRUE(codes);
   EXPECT_THAT((*codes)[0].count, testing::ElementsAre(testing::Pair(3, 2), testing::Pair(4, 1)));
   EXPECT_FALSE((*codes)[0].at_low_end);
   EXPECT_TRUE((*codes)[1].at_low_end);
   samples.u_V[0][1] += 0.3 * adc.lsb_V();
-  EXPECT_FALSE(count_codes(samples, poses, 0, adc));
+  EXPECT_FALSE(count_codes(samples, poses, 0, scale_of(adc)));
+}
+
+// A coarser step than the converter's: its points are read as the nearest of the converter's codes.
+TEST(CountCodes, TakesReadingsNearTheStepsOfAnotherConverterAndFoldsWhatIsKnownOfThem) {
+  const Adc adc{12, -5.0, 0.0};
+  const CodeScale coarser{.origin_V = -2.4001,
+                          .step_V = 3.7 * adc.lsb_V(),
+                          .off_scale = 0.6 / 3.7,
+                          .lowest_V = adc.min_V,
+                          .highest_V = adc.max_V - adc.lsb_V()};
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  const Eigen::Vector2d truth(0.03, -2.43);
+  constexpr int kPoses = 40, kReadings = 50;
+  SampleTable samples;
+  std::vector<Pose> poses;
+  Eigen::MatrixXd A(kPoses, 4);
+  Eigen::VectorXd known_V(kPoses);
+  for (int k = 0; k < kPoses; ++k) {
+    A.row(k) << std::cos(0.5 * k), std::sin(0.5 * k), std::cos(1.7 * k), 1;
+    known_V(k) = 0.004 * std::sin(0.9 * k);
+    poses.push_back({.first = samples.u_V[0].size(), .count = kReadings});
+    for (int i = 0; i < kReadings; ++i) {
+      const double exact_V = truth(0) * A(k, 0) + truth(1) + known_V(k) + 0.001 * normal(random);
+      const double point_V =
+          coarser.origin_V +
+          coarser.step_V * std::round((exact_V - coarser.origin_V) / coarser.step_V);
+      samples.u_V[0].push_back(adc.min_V +
+                               adc.lsb_V() * std::round((point_V - adc.min_V) / adc.lsb_V()));
+    }
+  }
+  const auto codes = count_codes(samples, poses, 0, coarser);
+  ASSERT_TRUE(codes);
+  EXPECT_FALSE(count_codes(
+      samples, poses, 0,
+      {coarser.origin_V, 1.3 * coarser.step_V, coarser.off_scale, adc.min_V, adc.max_V}));
+  const IntervalFit fit =
+      fit_intervals(A, *codes, Eigen::VectorXd::Zero(kPoses), known_V / coarser.step_V);
+  ASSERT_TRUE(fit.converged);
+  const Eigen::Vector4d expected(truth(0) / coarser.step_V, 0, 0,
+                                 (truth(1) - coarser.origin_V) / coarser.step_V);
+  for (Eigen::Index j = 0; j < 4; ++j)
+    EXPECT_NEAR(fit.value(j), expected(j), 4 * std::sqrt(fit.covariance(j, j))) << j;
+  EXPECT_LT(std::sqrt(fit.covariance(3, 3)), 0.02) << "of a step";
+  EXPECT_NEAR(fit.sigma, 0.001 / coarser.step_V, 0.2 * fit.sigma);
 }
 
 double error_over_sphere(const TriadEstimate& estimate, const SyntheticRun& data) {

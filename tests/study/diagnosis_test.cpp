@@ -131,6 +131,21 @@ TEST(DiagnosisStudy, SlowNoiseAtTheEdgesOfACoarseStepIsNoStructure) {
   expect_only_finding(outcome);
 }
 
+// Near the edges of its steps a converter says where the voltage is to a small part of the noise of
+// a reading, elsewhere hardly anything: means that count alike were off by 8 uncertainties.
+TEST(DiagnosisStudy, ACoarserStepIsCalibratedFromItsCodes) {
+  const SetOutcome outcome = run_set({.seed = 910008,
+                                      .effects = {"adc.quantization"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::random,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 600});
+  expect_only_finding(outcome);
+  EXPECT_LT(outcome.worst_K, 3);
+  EXPECT_LT(outcome.worst_U0, 3);
+}
+
 SetOutcome in_serpentine_order(const char* effect) {
   return run_set({.seed = 760002,
                   .effects = {effect},

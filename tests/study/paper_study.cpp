@@ -81,7 +81,8 @@ AxisRun measure(const Eigen::Vector4d& truth, double walk_V, std::mt19937_64& ra
 }
 
 Eigen::Vector4d from_intervals(const std::vector<CodeCounts>& codes) {
-  const IntervalFit fit = fit_intervals(design(), codes, Eigen::VectorXd::Zero(kPoses));
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(kPoses);
+  const IntervalFit fit = fit_intervals(design(), codes, none, none);
   Eigen::Vector4d value = step_V() * fit.value;
   value(3) += 0.5 * (kAdc.min_V + kAdc.max_V);
   return value;

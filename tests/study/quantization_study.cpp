@@ -131,7 +131,7 @@ TrialErrors estimate(const CodeCase& c, std::uint64_t seed) {
       plain.residual_sum_of_squares / static_cast<double>(plain.degrees_of_freedom);
   Estimate chosen{plain.x, variance_V2 * plain.cofactor};
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(kPoses);
-  if (const auto codes = quantized_axis(trial.run, trial.A, none, kAdc, 0)) {
+  if (const auto codes = quantized_axis(trial.run, trial.A, none, none, scale_of(kAdc), 0)) {
     chosen = weighted(trial.A, codes->mean_V, codes->variance_V2);
     errors.sigma = codes->use.sigma_V;
   }
