@@ -32,6 +32,7 @@ namespace {
 
 /// Parameters and rounding depend on each other; the second round changes nothing that is felt.
 constexpr int kRoundingRounds = 3;
+constexpr int kEdgeRounds = 10;  // the same where the steps keep their edges
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// What all axes share.
@@ -50,7 +51,11 @@ struct AxisWork {
   NoiseModel noise;   ///< with the powers that the run, too, supports
   NoiseModel record;  ///< what the static record says about the run
   PooledNoise pooled;
-  Eigen::VectorXd y;  ///< pose means, V
+  Eigen::VectorXd y;  ///< pose means freed of rounding, V
+  /// To be added to errors of y, and to their mean square, where errors are those of the means as
+  /// measured (RoundingFree::beyond_V2).
+  Eigen::VectorXd rounding_V;
+  double rounding_V2 = 0;
   Eigen::VectorXd positioning_V2;
   Eigen::VectorXd own_V2;  ///< variance that each pose has for itself: positioning and rounding
   GeneralisedFit fit;
@@ -181,9 +186,18 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
       free = free_of_rounding(mean_V, expected_V, *experiment.input.description.adc,
                               experiment.white_V[axis], samples_per_pose(experiment.input.run));
       work.y = free.mean_V;
-      ordinary = solve_least_squares(experiment.A, work.y);
+      // Where the steps keep their edges, few means say more than the others together.
+      const Eigen::VectorXd weight =
+          free.beyond_V2 ? Eigen::VectorXd(free.variance_V2.cwiseSqrt().cwiseInverse())
+                         : Eigen::VectorXd::Ones(n);
+      ordinary =
+          solve_least_squares(weight.asDiagonal() * experiment.A, weight.cwiseProduct(work.y));
     };
-    for (int round = 0; round < kRoundingRounds; ++round) free_means(experiment.A * ordinary.x);
+    int rounds = kRoundingRounds;
+    for (int round = 0; round < rounds; ++round) {
+      free_means(experiment.A * ordinary.x);
+      if (free.beyond_V2) rounds = kEdgeRounds;
+    }
     if (free.coarse && n > 4) {
       work.record = without_record(identified);
       const NoisePool pool(experiment.processes, work.record,
@@ -194,6 +208,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
     }
     work.own_V2 += free.variance_V2;
   }
+  work.rounding_V2 = free.beyond_V2.value_or(0);
+  work.rounding_V = free.beyond_V2 ? Eigen::VectorXd(mean_V - work.y) : Eigen::VectorXd::Zero(n);
   const NoisePowers identified_powers = noise_powers(work.record);
   bool known = identified_powers.sum() > 0 || free.coarse;
   if (!known && !rounded_as_declared(experiment.input, axis)) {
@@ -224,7 +240,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   }
   // Nothing is known about the noise: the residual has to say how large it is.
   const double dof = static_cast<double>(std::max<Eigen::Index>(n - 4, 1));
-  const double variance_V2 = std::max(ordinary.residual_sum_of_squares / dof, 1e-24);
+  const double variance_V2 =
+      std::max((work.y - experiment.A * ordinary.x).squaredNorm() / dof, 1e-24);
   work.V = Eigen::MatrixXd::Identity(n, n) * variance_V2;
   work.pooled.covariance = work.V;
   work.pooled.power(kTermN) = variance_V2 / experiment.processes.unit[kTermN](0, 0);
@@ -270,7 +287,8 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
 /// Expected pose RMS under the noise, and its uncertainty from that of the noise powers.
 void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_per_V,
               double& floor_mps2, double& u_floor_mps2) {
-  const double mean_square = expected_mean_square_V2(experiment.A, work.fit.gain, work.V);
+  const double mean_square =
+      expected_mean_square_V2(experiment.A, work.fit.gain, work.V) + work.rounding_V2;
   floor_mps2 = std::abs(mps2_per_V) * std::sqrt(mean_square);
   u_floor_mps2 = 0;
 
@@ -289,12 +307,13 @@ void floor_of(const Experiment& experiment, const AxisWork& work, double mps2_pe
 Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work, std::size_t axis,
                               double mps2_per_V, ErrorFigures& errors) {
   const MeasurementSet& run = experiment.input.run;
-  errors.fit_pose_rms_mps2[axis] = rms(mps2_per_V * work.fit.residual_V);
+  errors.fit_pose_rms_mps2[axis] = rms(mps2_per_V * (work.fit.residual_V + work.rounding_V));
   errors.sample_rms_mps2[axis] =
       std::abs(mps2_per_V) * sample_rms_V(run, experiment.A * work.fit.estimate.value, axis);
   Eigen::VectorXd heldout(2 * work.y.size());
   heldout << heldout_residuals_V(experiment.A, work.y, work.V, time_blocks(experiment.poses)),
       heldout_residuals_V(experiment.A, work.y, work.V, position_blocks(experiment.poses));
+  heldout += work.rounding_V.replicate<2, 1>();
   heldout *= mps2_per_V;
   errors.heldout_pose_rms_mps2[axis] = rms(heldout);
   errors.heldout_pose_max_abs_mps2[axis] = max_abs(heldout);
@@ -389,11 +408,13 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
       worst_error_mps2 = std::abs(heldout(k));
       const Eigen::Index row = k % static_cast<Eigen::Index>(n);
       u_worst_mps2 =
-          std::abs(mps2_per_V) * std::sqrt(std::max(w.fit.residual_covariance_V2(row, row), 0.0));
+          std::abs(mps2_per_V) *
+          std::sqrt(std::max(w.fit.residual_covariance_V2(row, row) + w.rounding_V2, 0.0));
     }
     for (std::size_t pose = 0; pose < n; ++pose) {
       PoseResult& row = result.pose_results[pose];
-      const double residual_mps2 = mps2_per_V * w.fit.residual_V(static_cast<Eigen::Index>(pose));
+      const auto k = static_cast<Eigen::Index>(pose);
+      const double residual_mps2 = mps2_per_V * (w.fit.residual_V(k) + w.rounding_V(k));
       row.residual_before_mps2[axis] = row.residual_after_mps2[axis] = residual_mps2;
     }
   }

@@ -25,6 +25,14 @@ double mps2_per_V(const EnlargedParameters& model, std::size_t axis) {
   return kStandardGravity_mps2 / model.twelve[axis](static_cast<Eigen::Index>(axis));
 }
 
+/// The means of which errors are stated: as measured where that is all that most of them say.
+PerAxis<Eigen::VectorXd> stated_means_V(const SearchInput& search, const SearchResult& found) {
+  PerAxis<Eigen::VectorXd> means_V = found.observed.mean_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (found.beyond_V2[i]) means_V[i] = search.observed.mean_V[i];
+  return means_V;
+}
+
 /// Held-out errors of both partitions, m/s², one vector of 2n per axis.
 PerAxis<Eigen::VectorXd> heldout_mps2(const Heldout& heldout, const std::vector<Blocks>& partitions,
                                       const EnlargedFit& fit) {
@@ -229,7 +237,11 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
   if (found.evidence.empty()) return without_effects();
   // Leaving out and the expected residual want the covariance under the noise that was used.
-  const auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
+  const PerAxis<Eigen::VectorXd> stated_V = stated_means_V(search, found);
+  auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    heldout_errors_mps2[i] +=
+        mps2_per_V(found.fit.parameters, i) * (stated_V[i] - mean_V[i]).replicate<2, 1>();
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   auto codes = estimate_from_codes(search, input.input.run, found);
@@ -281,14 +293,16 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
               : filter_estimate(input, search, estimated, estimated_V[i] - twelve_V[i], i),
         gravity);
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
-    const Eigen::VectorXd residual_mps2 = factor * (mean_V[i] - predicted_V[i]);
+    const Eigen::VectorXd residual_mps2 = factor * (stated_V[i] - predicted_V[i]);
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
     // The noise estimated beside the effects, not the one that had to take them up.
     const auto block = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     const Eigen::MatrixXd left_V2 =
         found.noise[i].covariance - block * under_this_noise * block.transpose();
     const double floor_mps2 =
-        std::abs(factor) * std::sqrt(std::max(left_V2.trace(), 0.0) / static_cast<double>(n));
+        std::abs(factor) *
+        std::sqrt(std::max(
+            left_V2.trace() / static_cast<double>(n) + found.beyond_V2[i].value_or(0), 0.0));
     if (result.floor_pose_rms_mps2[i] > 0) {
       result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
     }

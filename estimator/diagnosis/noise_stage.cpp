@@ -154,6 +154,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
         stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
     }
     stage.coarse[i] = free.coarse;
+    stage.beyond_V2[i] = freed ? before.freed->beyond_V2[i] : free.beyond_V2;
     stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
     stage.whitening.set(i, stage.noise[i].covariance);
   });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "estimator/diagnosis/search.h"
 
@@ -9,9 +10,10 @@ namespace plumbline {
 
 /// The model with noise of its own.
 struct Stage {
-  Observations observed;            ///< freed of rounding as this model sees it
-  PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
-  PerAxis<bool> coarse{};           ///< rounding matters
+  Observations observed;                     ///< freed of rounding as this model sees it
+  PerAxis<Eigen::VectorXd> own_V2;           ///< variance that each mean has for itself
+  PerAxis<bool> coarse{};                    ///< rounding matters
+  PerAxis<std::optional<double>> beyond_V2;  ///< RoundingFree's
   /// Further variance, in `noise` too, of means near a step of the response: slow noise decides on
   /// which side they are. Empty where it does not matter.
   PerAxis<Eigen::VectorXd> crossing_V2;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "estimator/diagnosis/candidates.h"
@@ -50,10 +51,11 @@ struct Evidence {
 struct SearchResult {
   EnlargedFit fit;  ///< 12 parameters and the effects, in the order of `evidence`
   std::vector<Evidence> evidence;
-  Observations observed;            ///< freed of rounding as the final model sees it
-  PerAxis<Eigen::VectorXd> own_V2;  ///< variance that each mean has for itself
-  PerAxis<bool> coarse{};           ///< rounding matters
-  PerAxis<PooledNoise> noise;       ///< re-estimated under the final model
+  Observations observed;                     ///< freed of rounding as the final model sees it
+  PerAxis<Eigen::VectorXd> own_V2;           ///< variance that each mean has for itself
+  PerAxis<bool> coarse{};                    ///< rounding matters
+  PerAxis<std::optional<double>> beyond_V2;  ///< RoundingFree's
+  PerAxis<PooledNoise> noise;                ///< re-estimated under the final model
   PoseWhitening whitening;
   CandidateResponses responses;  ///< of the candidates beside the final model
   double p_best_rest = 1;        ///< p-value of the best candidate that was not taken

@@ -271,6 +271,7 @@ SearchResult SearchModel::take_result() {
   result.observed = std::move(stage_.observed);
   result.own_V2 = std::move(stage_.own_V2);
   result.coarse = stage_.coarse;
+  result.beyond_V2 = stage_.beyond_V2;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (stage_.crossing_V2[axis].size() > 0) result.own_V2[axis] += stage_.crossing_V2[axis];
   result.noise = std::move(stage_.noise);

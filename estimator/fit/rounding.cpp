@@ -8,26 +8,29 @@
 #include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/noise/covariance.h"
+#include "estimator/quantization/interval_fit.h"
 
 namespace plumbline {
 namespace {
+
+constexpr double kLeastSigma = 0.002;  // steps
 
 double mean_square(const Eigen::VectorXd& v) {
   return v.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(v.size(), 1));
 }
 
-}  // namespace
-
-namespace {
-
-/// What is recorded holds the rounding itself: step²/12 when it is noise-like, less below.
+/// What is recorded holds the rounding itself: step²/12 when it is noise-like, less below. It grows
+/// with the noise.
 double noise_before_rounding_V2(double step_V, double recorded_V2) {
-  double white_V2 = recorded_V2;
-  for (int round = 0; round < 20; ++round) {
-    const double shared_V2 = rounding_variance(step_V, std::sqrt(white_V2));
-    white_V2 = std::max(0.0, recorded_V2 - (step_V * step_V / 12 - shared_V2));
+  constexpr int kHalvings = 30;
+  double low_V = 0, high_V = std::sqrt(recorded_V2);
+  for (int k = 0; k < kHalvings; ++k) {
+    const double sigma_V = 0.5 * (low_V + high_V);
+    const double would_record_V2 =
+        sigma_V * sigma_V + step_V * step_V / 12 - rounding_variance(step_V, sigma_V);
+    (would_record_V2 < recorded_V2 ? low_V : high_V) = sigma_V;
   }
-  return white_V2;
+  return 0.25 * (low_V + high_V) * (low_V + high_V);
 }
 
 /// Variance of one rounded reading of `value` (in steps from a code) with noise `sigma`, steps².
@@ -67,6 +70,24 @@ double sigma_at(const Eigen::ArrayXd& values, double recorded_variance, double u
     (variance < recorded_variance * static_cast<double>(values.size()) ? low : high) = sigma;
   }
   return 0.5 * (low + high);
+}
+
+/// The readings of which these are the means, in steps from a code, of noise so small that they
+/// share two neighbouring codes at most.
+std::vector<CodeCounts> counts_of_means(const Eigen::VectorXd& mean, double samples_per_mean) {
+  std::vector<CodeCounts> all;
+  for (const double value : mean) {
+    CodeCounts codes;
+    codes.mean = value;
+    // Whole readings: files round the voltages of the codes.
+    const double readings = std::round(value * samples_per_mean);
+    const double lower = std::floor(readings / samples_per_mean);
+    const double above = readings - lower * samples_per_mean;
+    if (above < samples_per_mean) codes.count.emplace_back(lower, samples_per_mean - above);
+    if (above > 0) codes.count.emplace_back(lower + 1, above);
+    all.push_back(std::move(codes));
+  }
+  return all;
 }
 
 /// The most that rounding takes from or adds to a mean of readings with noise `sigma_V`.
@@ -114,7 +135,19 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
   const double full_V2 = rounding_variance(step_V, sigma_V);
   const double mean_white_V2 = recorded_V2 / samples_per_mean;
   RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
-  if (leaves_edges(step_V, sigma_V)) return result;
+  if (leaves_edges(step_V, sigma_V)) {
+    const double origin_V = 0.5 * (adc.min_V + adc.max_V);
+    const Eigen::VectorXd mean = (mean_V.array() - origin_V) / step_V;
+    const Eigen::VectorXd expected = (expected_V.array() - origin_V) / step_V;
+    const double sigma =
+        sigma_at(expected.array(), recorded_V2 / (step_V * step_V), sigma_V / step_V, 0.0);
+    const CodeSites sites = sites_about(expected, counts_of_means(mean, samples_per_mean),
+                                        std::max(sigma, kLeastSigma));
+    result.mean_V = (origin_V + step_V * sites.mean.array()).matrix();
+    result.variance_V2 = step_V * step_V * sites.variance;
+    result.beyond_V2 = full_V2 + mean_white_V2 - result.variance_V2.mean();
+    return result;
+  }
   const double before_V2 = mean_square(mean_V - expected_V);
   const double origin_V = 0.5 * (adc.min_V + adc.max_V);
   // How far the true mean is from the expected one blurs the bias; found by repetition.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "estimator/measurement.h"
 
@@ -25,6 +26,10 @@ struct RoundingFree {
   /// Whether rounding matters. Then a static record, taken at one place within the step, does not
   /// say how large the white noise of other poses is.
   bool coarse = false;
+  /// Where the steps keep their edges, most means say in which step the voltage lies and no more:
+  /// errors are then stated of the means as measured. By how much their mean square exceeds that of
+  /// variance_V2 (negative, if less); nothing where errors are those of mean_V.
+  std::optional<double> beyond_V2 = {};
 };
 
 /// Noise that is small against the step of the converter does not average rounding away, but what

@@ -315,4 +315,31 @@ IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts
   return fit;
 }
 
+CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCounts>& codes,
+                      double sigma) {
+  constexpr std::array<double, 6> kOff = {0.005, 0.015, 0.05, 0.15, 0.5, 1.5};  // steps
+  constexpr double kMostVariance = 1;
+  const Eigen::Index n = expected.size();
+  CodeSites best;
+  double best_evidence = -kInfinity;
+  for (const double off : kOff) {
+    CodeSites sites{Eigen::VectorXd(n), Eigen::VectorXd(n)};
+    double evidence = 0;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const TiltedMoments tilted =
+          moments_of(codes[static_cast<std::size_t>(k)], sigma, expected(k), off * off);
+      evidence += tilted.log_mass;
+      const double precision = std::max(1 / tilted.variance - 1 / (off * off), 1 / kMostVariance);
+      // That the expectation and the site together have the mean that they have with the codes.
+      sites.mean(k) = tilted.mean + (tilted.mean - expected(k)) / (off * off * precision);
+      sites.variance(k) = 1 / precision;
+    }
+    if (evidence > best_evidence) {
+      best_evidence = evidence;
+      best = std::move(sites);
+    }
+  }
+  return best;
+}
+
 }  // namespace plumbline

@@ -57,4 +57,16 @@ struct IntervalFit {
 IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
                           const Eigen::VectorXd& known_variance, const Eigen::VectorXd& known);
 
+/// What the codes of each pose say about its output, n poses, steps: a measurement with Gaussian
+/// error.
+struct CodeSites {
+  Eigen::VectorXd mean;
+  Eigen::VectorXd variance;
+};
+
+/// Where each output is expected at `expected`, independently of the others. How far off that is
+/// maximises the evidence. Variances are at most 1.
+CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCounts>& codes,
+                      double sigma);
+
 }  // namespace plumbline

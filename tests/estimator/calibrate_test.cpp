@@ -210,10 +210,11 @@ TEST(Calibrate, RoundingWithoutNoiseIsNotAveragedAway) {
   const Calibration result = calibrated(data);
   const double expected_mps2 = kTwelveBits.lsb_V() / std::sqrt(12.0) / 0.032 * 9.80665;
   EXPECT_NEAR(result.before.fit_pose_rms_mps2[0], expected_mps2, 0.3 * expected_mps2);
-  // The run alone has to say that there is no slow noise, and 60 poses say so within limits.
+  // Codes say a little more than means with independent errors would, but the run alone has to say
+  // that there is no slow noise, and 60 poses say so within limits.
   const double independent_V = kTwelveBits.lsb_V() / std::sqrt(12.0 * 60);
   const double u_U0_V = std::sqrt(result.estimates.batch_ls[0].covariance(3, 3));
-  EXPECT_GT(u_U0_V, 1.1 * independent_V);
+  EXPECT_GT(u_U0_V, 0.5 * independent_V);
   EXPECT_LT(u_U0_V, 4.0 * independent_V);
 }
 
@@ -248,6 +249,9 @@ void expect_coverage(const Adc& adc, double sigma_V) {
 }
 
 TEST(Coverage, SixteenBits) { expect_coverage(kSixteenBits, 3e-4); }
+TEST(Coverage, TwelveBitsWithNoiseOfATwentiethOfAStep) {
+  expect_coverage(kTwelveBits, 0.05 * kTwelveBits.lsb_V());
+}
 TEST(Coverage, TwelveBitsWithNoiseOfHalfAStep) {
   expect_coverage(kTwelveBits, 0.5 * kTwelveBits.lsb_V());
 }

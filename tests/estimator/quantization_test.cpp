@@ -122,6 +122,59 @@ TEST(RoundingFree, MovesNoMeanByMoreThanRoundingDoes) {
   EXPECT_LT(std::abs(free.mean_V(0) - mean_V(0)), 0.2 * step_V);
 }
 
+// Readings taken all over the steps scatter by what rounding adds; the less noise, the more of it.
+TEST(RoundingFree, NoiseIsToldFromWhatRoundingAddsHoweverSmall) {
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  constexpr int kPlaces = 4000, kReadings = 50;
+  for (const double sigma : {0.03, 0.06, 0.12, 0.25, 0.5}) {
+    double square = 0;
+    for (int place = 0; place < kPlaces; ++place) {
+      double sum = 0, of_squares = 0;
+      for (int i = 0; i < kReadings; ++i) {
+        const double code = std::round((place + 0.5) / kPlaces + sigma * normal(random));
+        sum += code;
+        of_squares += code * code;
+      }
+      square += (of_squares - sum * sum / kReadings) / (kReadings - 1) / kPlaces;
+    }
+    EXPECT_NEAR(sd_before_rounding_V(1, std::sqrt(square)), sigma, 0.05 * sigma);
+  }
+}
+
+// Readings all alike say in which step the voltage lies; some of them on the other side of an edge
+// say where it is to a small part of the step.
+TEST(RoundingFree, MeansInsideAStepWithEdgesCountForLittle) {
+  const Adc adc{10, -5.0, 0.0};
+  const double step_V = adc.lsb_V(), sigma = 0.06;
+  constexpr int kMeans = 100, kReadings = 40;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd mean_V(kMeans), expected_V(kMeans), true_V(kMeans);
+  for (int k = 0; k < kMeans; ++k) {
+    const double place = 0.01 * k - 0.5;  // of the step, from its middle
+    true_V(k) = adc.volts(7) + step_V * place;
+    expected_V(k) = true_V(k) + 0.02 * step_V * normal(random);
+    double sum = 0;
+    for (int i = 0; i < kReadings; ++i) sum += std::round(place + sigma * normal(random));
+    // As in a file.
+    mean_V(k) = std::round(1e5 * (adc.volts(7) + step_V * sum / kReadings)) / 1e5;
+  }
+  const double recorded_V = step_V * std::sqrt(sigma * 0.56);
+  const RoundingFree free = free_of_rounding(mean_V, expected_V, adc, recorded_V, kReadings);
+  ASSERT_TRUE(free.coarse);
+  ASSERT_TRUE(free.beyond_V2);
+  const double sd_in_the_middle = std::sqrt(free.variance_V2(kMeans / 2)) / step_V;
+  EXPECT_GT(sd_in_the_middle, 0.9);
+  EXPECT_LT(std::sqrt(free.variance_V2(0)) / step_V, 0.05);
+  const Eigen::VectorXd off =
+      (free.mean_V - true_V).cwiseAbs().cwiseQuotient(free.variance_V2.cwiseSqrt());
+  EXPECT_LT(off.maxCoeff(), 4);
+  // Errors are those of the means as measured: a step is about that wide.
+  const double stated_V2 = *free.beyond_V2 + free.variance_V2.mean();
+  EXPECT_NEAR(stated_V2, (mean_V - true_V).squaredNorm() / kMeans, 0.3 * stated_V2);
+}
+
 TEST(IntervalFit, AsGoodAsLeastSquaresWhereNoiseSmoothsTheSteps) {
   const Errors smooth = errors_of({1, 100}, 2);
   EXPECT_NEAR(smooth.intervals, smooth.least_squares, 0.05 * smooth.least_squares);

@@ -146,6 +146,27 @@ TEST(DiagnosisStudy, ACoarserStepIsCalibratedFromItsCodes) {
   EXPECT_LT(outcome.worst_U0, 3);
 }
 
+// With noise of a twentieth of the declared step a ring of poses has one rounding error in common:
+// taken for independent, that passed for functions of the angles.
+TEST(DiagnosisStudy, RoundingToStepsWithEdgesIsNoEffect) {
+  SetDesign design{.seed = 943007,
+                   .effects = {},
+                   .order = sim::RecordOrder::random,
+                   .bits = 10,
+                   .samples_per_pose = 40,
+                   .static_s = 600};
+  const SetOutcome clean = run_set(design);
+  EXPECT_EQ(clean.wrong + clean.unlisted, 0) << clean.found;
+  EXPECT_EQ(clean.verdict, Verdict::clean);
+  design.effects = {"sensor.quadratic"};
+  design.size = 1;
+  const SetOutcome quadratic = run_set(design);
+  expect_only_finding(quadratic);
+  EXPECT_EQ(quadratic.unlisted, 0) << quadratic.found;
+  EXPECT_EQ(quadratic.parameters_within, quadratic.parameters) << quadratic.found;
+  EXPECT_LT(quadratic.worst_K, 4);
+}
+
 SetOutcome in_serpentine_order(const char* effect) {
   return run_set({.seed = 760002,
                   .effects = {effect},
