@@ -13,8 +13,6 @@
 namespace plumbline {
 namespace {
 
-constexpr double kLeastSigma = 0.002;  // steps
-
 double mean_square(const Eigen::VectorXd& v) {
   return v.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(v.size(), 1));
 }
@@ -99,6 +97,29 @@ double largest_bias_V(double step_V, double sigma_V) {
   return largest_V;
 }
 
+/// Noise of a reading, before rounding and as recorded, and the readings of a mean.
+struct Readings {
+  double sigma_V = 0;
+  double recorded_V = 0;
+  double per_mean = 0;
+};
+
+/// Mean and variance of each voltage where steps keep their edges, from how many readings are on
+/// which side of them.
+void within_edges(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V, const Adc& adc,
+                  const Readings& readings, RoundingFree& free) {
+  constexpr double kLeastSigma = 0.002;  // steps
+  const double step_V = adc.lsb_V(), origin_V = 0.5 * (adc.min_V + adc.max_V);
+  const Eigen::VectorXd mean = (mean_V.array() - origin_V) / step_V;
+  const Eigen::VectorXd expected = (expected_V.array() - origin_V) / step_V;
+  const double sigma = sigma_at(expected.array(), std::pow(readings.recorded_V / step_V, 2),
+                                readings.sigma_V / step_V, 0.0);
+  const CodeSites sites =
+      sites_about(expected, counts_of_means(mean, readings.per_mean), std::max(sigma, kLeastSigma));
+  free.mean_V = (origin_V + step_V * sites.mean.array()).matrix();
+  free.variance_V2 = step_V * step_V * sites.variance;
+}
+
 }  // namespace
 
 double sd_before_rounding_V(double step_V, double recorded_V) {
@@ -136,15 +157,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
   const double mean_white_V2 = recorded_V2 / samples_per_mean;
   RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
   if (leaves_edges(step_V, sigma_V)) {
-    const double origin_V = 0.5 * (adc.min_V + adc.max_V);
-    const Eigen::VectorXd mean = (mean_V.array() - origin_V) / step_V;
-    const Eigen::VectorXd expected = (expected_V.array() - origin_V) / step_V;
-    const double sigma =
-        sigma_at(expected.array(), recorded_V2 / (step_V * step_V), sigma_V / step_V, 0.0);
-    const CodeSites sites = sites_about(expected, counts_of_means(mean, samples_per_mean),
-                                        std::max(sigma, kLeastSigma));
-    result.mean_V = (origin_V + step_V * sites.mean.array()).matrix();
-    result.variance_V2 = step_V * step_V * sites.variance;
+    within_edges(mean_V, expected_V, adc, {sigma_V, sample_sd_V, samples_per_mean}, result);
     result.beyond_V2 = full_V2 + mean_white_V2 - result.variance_V2.mean();
     return result;
   }

@@ -317,7 +317,8 @@ IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts
 
 CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCounts>& codes,
                       double sigma) {
-  constexpr std::array<double, 6> kOff = {0.005, 0.015, 0.05, 0.15, 0.5, 1.5};  // steps
+  // Steps; from far off a site is the step's whole width.
+  constexpr std::array<double, 9> kOff = {0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5, 15, 50};
   constexpr double kMostVariance = 1;
   const Eigen::Index n = expected.size();
   CodeSites best;
@@ -334,7 +335,7 @@ CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCou
       sites.mean(k) = tilted.mean + (tilted.mean - expected(k)) / (off * off * precision);
       sites.variance(k) = 1 / precision;
     }
-    if (evidence > best_evidence) {
+    if (best.mean.size() == 0 || evidence > best_evidence) {
       best_evidence = evidence;
       best = std::move(sites);
     }
