@@ -151,8 +151,7 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   }
   // The scatter found between the codes of different poses holds the slow noise once more.
   const double twice_V2 = std::min(squared(quantized->use.scatter_V), V.diagonal().mean());
-  quantized->variance_V2 =
-      (quantized->variance_V2.array() - twice_V2).max(0.1 * quantized->variance_V2.array());
+  quantized->variance_V2 = quantized->variance_without_V2(twice_V2);
   V.diagonal() += quantized->variance_V2;
   const auto fit = fit_generalised(experiment.A, quantized->mean_V, V);
   if (!fit) return;
@@ -193,11 +192,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
       ordinary =
           solve_least_squares(weight.asDiagonal() * experiment.A, weight.cwiseProduct(work.y));
     };
-    int rounds = kRoundingRounds;
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < (free.beyond_V2 ? kEdgeRounds : kRoundingRounds); ++round)
       free_means(experiment.A * ordinary.x);
-      if (free.beyond_V2) rounds = kEdgeRounds;
-    }
     if (free.coarse && n > 4) {
       work.record = without_record(identified);
       const NoisePool pool(experiment.processes, work.record,

@@ -1,17 +1,16 @@
 #include "estimator/diagnosis/code_estimate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <string>
 
-#include "estimator/fit/rounding.h"
 #include "estimator/quantization/quantized_axis.h"
 
 namespace plumbline {
 namespace {
 
 enum Parameter : std::size_t { kLsb, kOrigin };  // of adc.quantization
-constexpr double kLeastOwn = 0.1;  // of a pose's variance: the scatter taken off is an estimate
 
 bool rounds(const VisitLog& log, const ActiveEffect& active) {
   return active.effect->id() == "adc.quantization" && active.effect->certain(log, active.axis);
@@ -38,9 +37,7 @@ struct RoundedAxis {
 std::optional<RoundedAxis> rounded_axis(const VisitLog& log, const SearchResult& found,
                                         std::size_t axis) {
   std::optional<RoundedAxis> rounded;
-  if (log.adc && log.codes[axis].stuck_bits.empty() &&
-      leaves_edges(log.adc->lsb_V(), log.input_sd_V[axis]))
-    rounded = {scale_of(*log.adc), std::nullopt};
+  if (found.beyond_V2[axis]) rounded = {scale_of(*log.adc), std::nullopt};
   for (std::size_t e = 0; e < found.fit.parameters.effects.size(); ++e) {
     const ActiveEffect& active = found.fit.parameters.effects[e];
     const auto axes = axes_of(active);
@@ -85,9 +82,7 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
     if (!quantized) continue;
     any = true;
     // How far the poses scatter beyond their codes is left to the noise, which knows of slow parts.
-    const double scatter_V = quantized->use.scatter_V;
-    result.own_V2[axis] = (quantized->variance_V2.array() - scatter_V * scatter_V)
-                              .max(kLeastOwn * quantized->variance_V2.array());
+    result.own_V2[axis] = quantized->variance_without_V2(std::pow(quantized->use.scatter_V, 2));
     const NoisePool pool(input.processes, without_record(input.noise[axis]), result.own_V2[axis]);
     result.noise[axis] = pool.pool(quantized->mean_V - known_V, A);
     result.observed.mean_V[axis] = quantized->mean_V;

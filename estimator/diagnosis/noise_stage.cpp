@@ -113,7 +113,8 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     };
     if (freed) {
       mean_V = before.freed->observed.mean_V[i];
-      free = {mean_V, before.freed->own_V2[i] - input.positioning_V2[i], true};
+      free = {mean_V, before.freed->own_V2[i] - input.positioning_V2[i], true,
+              before.freed->beyond_V2[i]};
     } else {
       free_means(predicted[i]);
     }
@@ -154,7 +155,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
         stage.noise[i].covariance.diagonal() += free.variance_V2 - first_V2;
     }
     stage.coarse[i] = free.coarse;
-    stage.beyond_V2[i] = freed ? before.freed->beyond_V2[i] : free.beyond_V2;
+    stage.beyond_V2[i] = free.beyond_V2;
     stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
     stage.whitening.set(i, stage.noise[i].covariance);
   });

@@ -97,27 +97,23 @@ double largest_bias_V(double step_V, double sigma_V) {
   return largest_V;
 }
 
-/// Noise of a reading, before rounding and as recorded, and the readings of a mean.
-struct Readings {
-  double sigma_V = 0;
-  double recorded_V = 0;
-  double per_mean = 0;
-};
+/// Of a step: with more noise 6e-5 of it are left of rounding to it.
+constexpr double kNoTrace = 0.7;
+/// Of a step: less noise leaves the staircase its edges; a mean says in which step the voltage lies
+/// and no more, and to first order there is nothing to undo.
+constexpr double kSoftest = 0.15;
 
-/// Mean and variance of each voltage where steps keep their edges, from how many readings are on
-/// which side of them.
-void within_edges(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V, const Adc& adc,
-                  const Readings& readings, RoundingFree& free) {
-  constexpr double kLeastSigma = 0.002;  // steps
-  const double step_V = adc.lsb_V(), origin_V = 0.5 * (adc.min_V + adc.max_V);
-  const Eigen::VectorXd mean = (mean_V.array() - origin_V) / step_V;
-  const Eigen::VectorXd expected = (expected_V.array() - origin_V) / step_V;
-  const double sigma = sigma_at(expected.array(), std::pow(readings.recorded_V / step_V, 2),
-                                readings.sigma_V / step_V, 0.0);
-  const CodeSites sites =
-      sites_about(expected, counts_of_means(mean, readings.per_mean), std::max(sigma, kLeastSigma));
-  free.mean_V = (origin_V + step_V * sites.mean.array()).matrix();
-  free.variance_V2 = step_V * step_V * sites.variance;
+/// Where steps keep their edges: the voltages from how many readings are on which side of them.
+/// Noise of a reading in steps, as recorded and before rounding.
+CodeSites within_edges(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
+                       const CodeScale& scale, double samples_per_mean, double recorded,
+                       double uniform_sigma) {
+  constexpr double kLeastSigma = 0.002;
+  const Eigen::VectorXd mean = (mean_V.array() - scale.origin_V) / scale.step_V;
+  const Eigen::VectorXd expected = (expected_V.array() - scale.origin_V) / scale.step_V;
+  const double sigma = sigma_at(expected.array(), recorded * recorded, uniform_sigma, 0.0);
+  return sites_about(expected, counts_of_means(mean, samples_per_mean),
+                     std::max(sigma, kLeastSigma));
 }
 
 }  // namespace
@@ -127,14 +123,7 @@ double sd_before_rounding_V(double step_V, double recorded_V) {
 }
 
 bool is_coarse_against(double step_V, double sample_sd_V) {
-  constexpr double kNoTrace = 0.7;  // of a step: 6e-5 of it are left
-  return std::sqrt(noise_before_rounding_V2(step_V, sample_sd_V * sample_sd_V)) <=
-         kNoTrace * step_V;
-}
-
-bool leaves_edges(double step_V, double sigma_V) {
-  constexpr double kSoftest = 0.15;
-  return sigma_V < kSoftest * step_V;
+  return sd_before_rounding_V(step_V, sample_sd_V) <= kNoTrace * step_V;
 }
 
 Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
@@ -146,23 +135,26 @@ Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
 
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
                               const Adc& adc, double sample_sd_V, double samples_per_mean) {
-  const double step_V = adc.lsb_V();
+  const CodeScale scale = scale_of(adc);
+  const double step_V = scale.step_V, origin_V = scale.origin_V;
   const double recorded_V2 = sample_sd_V * sample_sd_V;
   double white_V2 = noise_before_rounding_V2(step_V, recorded_V2);
   double sigma_V = std::sqrt(white_V2);
   const Eigen::Index n = mean_V.size();
-  if (!is_coarse_against(step_V, sample_sd_V)) return {mean_V, Eigen::VectorXd::Zero(n), false};
+  if (sigma_V > kNoTrace * step_V) return {mean_V, Eigen::VectorXd::Zero(n), false};
 
   const double full_V2 = rounding_variance(step_V, sigma_V);
   const double mean_white_V2 = recorded_V2 / samples_per_mean;
   RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
-  if (leaves_edges(step_V, sigma_V)) {
-    within_edges(mean_V, expected_V, adc, {sigma_V, sample_sd_V, samples_per_mean}, result);
+  if (sigma_V < kSoftest * step_V) {
+    const CodeSites sites = within_edges(mean_V, expected_V, scale, samples_per_mean,
+                                         sample_sd_V / step_V, sigma_V / step_V);
+    result.mean_V = (origin_V + step_V * sites.mean.array()).matrix();
+    result.variance_V2 = step_V * step_V * sites.variance;
     result.beyond_V2 = full_V2 + mean_white_V2 - result.variance_V2.mean();
     return result;
   }
   const double before_V2 = mean_square(mean_V - expected_V);
-  const double origin_V = 0.5 * (adc.min_V + adc.max_V);
   // How far the true mean is from the expected one blurs the bias; found by repetition.
   double slow_V2 = std::max(0.0, before_V2 - full_V2 - mean_white_V2);
   sigma_V =

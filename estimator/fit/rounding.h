@@ -15,10 +15,6 @@ double sd_before_rounding_V(double step_V, double recorded_V);
 /// Whether noise of `sample_sd_V`, as recorded, is too small to average rounding to `step_V` away.
 bool is_coarse_against(double step_V, double sample_sd_V);
 
-/// Whether noise of `sigma_V` before rounding leaves the steps their edges: a mean says in which of
-/// them the voltage lies and no more, and to first order there is nothing to undo.
-bool leaves_edges(double step_V, double sigma_V);
-
 /// Readings of one axis with rounding, as a model sees it.
 struct RoundingFree {
   Eigen::VectorXd mean_V;       ///< what the means would have been without rounding

@@ -13,6 +13,12 @@ struct QuantizedAxis {
   Eigen::VectorXd mean_V;       ///< n
   Eigen::VectorXd variance_V2;  ///< n, positioning and noise included
   QuantizationUse use;
+
+  /// n: variance_V2 without that part of the scatter from pose to pose; at least a tenth of it,
+  /// since the scatter is an estimate.
+  Eigen::VectorXd variance_without_V2(double scatter_V2) const {
+    return (variance_V2.array() - scatter_V2).max(0.1 * variance_V2.array());
+  }
 };
 
 /// Nothing when the noise is large enough to smooth the steps (readings scatter by more than 0.9

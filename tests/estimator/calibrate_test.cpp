@@ -214,8 +214,14 @@ TEST(Calibrate, RoundingWithoutNoiseIsNotAveragedAway) {
   // that there is no slow noise, and 60 poses say so within limits.
   const double independent_V = kTwelveBits.lsb_V() / std::sqrt(12.0 * 60);
   const double u_U0_V = std::sqrt(result.estimates.batch_ls[0].covariance(3, 3));
-  EXPECT_GT(u_U0_V, 0.5 * independent_V);
+  EXPECT_GT(u_U0_V, 0.75 * independent_V);
   EXPECT_LT(u_U0_V, 4.0 * independent_V);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const AxisEstimate& batch = result.estimates.batch_ls[axis];
+    for (Eigen::Index j = 0; j < 4; ++j)
+      EXPECT_NEAR(batch.value(j), data.truth[axis][static_cast<std::size_t>(j)],
+                  3 * std::sqrt(batch.covariance(j, j)));
+  }
 }
 
 TEST(Calibrate, IsDeterministic) {
