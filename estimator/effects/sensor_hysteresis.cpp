@@ -5,6 +5,10 @@
 namespace plumbline {
 namespace {
 
+// Standing at the same angle again, a head is off by some 10″: whether so little rises, nobody
+// knows.
+constexpr double kSameForce_g = 1e-4;
+
 // Hysteresis: ±w/2, + when a_i rose on the way to this pose, − when it fell.
 class Hysteresis final : public Effect {
  public:
@@ -27,7 +31,7 @@ class Hysteresis final : public Effect {
     const double before_g =
         from_zero ? Eigen::Vector3d(input.log.gamma, 0, 0)(i) : input.a_g[input.visit - 1](i);
     const double rise = input.a_g[input.visit](i) - before_g;
-    if (std::abs(rise) < 1e-9) return 0;
+    if (std::abs(rise) < kSameForce_g) return 0;
     return rise > 0 ? p[0] / 2 : -p[0] / 2;
   }
 };

@@ -20,15 +20,12 @@ void PoseTracker::observe(double t_s, const HeadState& head) {
   const Angles here{head.delta.angle_deg, head.h.angle_deg};
   if (!started_) {
     started_ = true;
-    rest_ = previous_ = here;
+    rest_ = here;
     arrival_s_ = t_s;
   }
   const bool moving = head.delta.moving || head.h.moving;
   if (moving && !moving_) {
-    if (t_s - arrival_s_ >= kShortestPose_s) {
-      previous_ = rest_;
-      ++pose_;
-    }
+    if (t_s - arrival_s_ >= kShortestPose_s) ++pose_;
     moving_ = true;
   }
   const bool arrived = head.delta.in_position && head.h.in_position;
@@ -44,7 +41,6 @@ void PoseTracker::observe(double t_s, const HeadState& head) {
 
 void PoseTracker::arrive(double t_s, const Arrival& arrival) {
   const Angles here{arrival.delta_deg, arrival.h_deg};
-  previous_ = started_ ? rest_ : here;
   started_ = true;
   moving_ = false;
   if (arrival.approach != 0) approach_ = arrival.approach;

@@ -8,7 +8,7 @@ namespace plumbline::sim {
 /// A stop shorter than this is only passed through (one-sided approach) and is no pose.
 inline constexpr double kShortestPose_s = 0.3;
 
-/// Where the head stands, where it came from and since when.
+/// Where the head stands, from which side it came and since when.
 class PoseTracker {
  public:
   /// The head at the next instant; times must not decrease.
@@ -20,8 +20,6 @@ class PoseTracker {
   int approach() const { return approach_; }  ///< direction of the last δ motion
   long long pose() const { return pose_; }    ///< number of the pose, or of the one being gone to
   double arrival_s() const { return arrival_s_; }
-  double previous_delta_deg() const { return previous_.delta_deg; }
-  double previous_h_deg() const { return previous_.h_deg; }
 
  private:
   struct Angles {
@@ -34,8 +32,7 @@ class PoseTracker {
   int approach_ = 0;
   long long pose_ = 0;
   double arrival_s_ = 0;
-  Angles rest_;      ///< last rest, via stops included
-  Angles previous_;  ///< last pose left
+  Angles rest_;  ///< last one, via stops included
 };
 
 }  // namespace plumbline::sim

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "rig/sim/effects/effect.h"
@@ -68,8 +69,6 @@ struct Unit::Impl {
     now.t_in_pose_s = t_s - tracker.arrival_s();
     const HeadErrors ideal;
     now.a_nominal = scaled(attitude(ideal, now.delta_deg, now.h_deg).up, gravity_g);
-    now.a_previous = scaled(
-        attitude(ideal, tracker.previous_delta_deg(), tracker.previous_h_deg()).up, gravity_g);
     room_state = room.next(t_s, now.dt_s, now.h_deg, moving);
     now.air_C = room_state.air_C;
     now.temp_C = room_state.temp_C;
@@ -99,6 +98,10 @@ struct Unit::Impl {
     for (auto& effect : effects) effect->bend_head(now, errors);
     now.attitude = attitude(errors, now.delta_deg, now.h_deg, now.approach);
     now.a = scaled(now.attitude.up, gravity_g);
+    if (!a_at_rest || now.pose != came_to) a_previous = a_at_rest.value_or(now.a);
+    came_to = now.pose;
+    if (!now.moving || !a_at_rest) a_at_rest = now.a;
+    now.a_previous = a_previous;
 
     NodeSample out;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -153,6 +156,9 @@ struct Unit::Impl {
   double noise_dt_s = 0;
   double delta_scatter_deg = 0;
   double h_scatter_deg = 0;
+  std::optional<PerAxis<double>> a_at_rest;  ///< true one at the last rest, via stops included, g
+  PerAxis<double> a_previous{};              ///< the same at the last pose left
+  long long came_to = 0;                     ///< pose since which a_previous holds
 };
 
 Unit::Unit(const World& world, std::uint64_t seed) : impl_(std::make_unique<Impl>(world, seed)) {}

@@ -225,6 +225,16 @@ TEST(SensorEffects, SettlingDecaysFromThePreviousPose) {
                                                       0.075 * 0.3678794412, -0.05 * 0.3678794412});
 }
 
+// A sensor feels where the head really stood, whatever it was told.
+TEST(SensorEffects, MemoryIsOfTheTrueAttitude) {
+  PlainUnit unit(effect("id = 'sensor.settling'\nc = 0.1\ntau = 0.5") +
+                 effect("id = 'rig.delta_eccentricity'\nc = 30"));  // δ += 30°·cos δ
+  unit.go(0, 0, 0);  // in truth δ = 30°: a = (0.8660254, −0.5, 0)
+  unit.reading_g();
+  unit.go(5, 60, 30);  // in truth δ = 75°: a = (0.2241439, −0.8365163, 0.5)
+  expect_g(unit.reading_g(), {0.2241438680 + 0.06418815357, -0.8365163037 + 0.03365163037, 0.45});
+}
+
 // --- electronics ---------------------------------------------------------------------------------
 
 std::array<std::int32_t, 3> codes_with(const std::string& keys, int bits, double u_x_V) {

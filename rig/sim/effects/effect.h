@@ -36,12 +36,11 @@ struct Moment {
   int approach = 0;        ///< direction of the last δ motion: −1, +1, 0 before the first
   long long pose = 0;      ///< counts the arrivals at rest; 0 is where the head stands first
   double t_in_pose_s = 0;  ///< since the arrival
-  PerAxis<double>
-      a_previous;  ///< nominal specific force at the previous pose, g; first pose: its own
   PerAxis<double> a_nominal;  ///< nominal specific force at the angles above, g
 
   Attitude attitude;  ///< with all head errors; filled in after bend_head()
   PerAxis<double> a;  ///< true specific force in the sensor frame, g; likewise
+  PerAxis<double> a_previous;  ///< the same when the head left the previous pose; first pose: a
 
   double air_C = 0;   ///< of the room
   double temp_C = 0;  ///< of the sensor

@@ -76,7 +76,7 @@ class Popcorn final : public Effect {
 /// power of time, unlike any exponential.
 std::unique_ptr<Effect> dielectric_absorption(const EffectContext& p) {
   return sensor_term(p, [c = p("c"), tau = p("tau")](const Moment& now, std::size_t i) {
-    return c * (now.a_previous[i] - now.a_nominal[i]) / (1 + now.t_in_pose_s / tau);
+    return c * (now.a_previous[i] - now.a[i]) / (1 + now.t_in_pose_s / tau);
   });
 }
 

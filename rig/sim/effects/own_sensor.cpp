@@ -1,5 +1,6 @@
 // Effects of the sensor that are on no list: a calibration has to find them by their shape.
 #include <cmath>
+#include <optional>
 
 #include "rig/sim/effects/effect.h"
 #include "rig/sim/effects/terms.h"
@@ -55,8 +56,8 @@ class Creep final : public Effect {
         memory_{Lag(p("tau")), Lag(p("tau")), Lag(p("tau"))} {}
   void observe(const Moment& now) override {
     // Between two poses the head has spent about the time of the step at the earlier one.
-    const PerAxis<double>& load = now.moving ? now.a_previous : now.a_nominal;
-    for (std::size_t i = 0; i < kAxisCount; ++i) memory_[i].next(load[i], now.dt_s);
+    if (!now.moving || !load_) load_ = now.a_nominal;
+    for (std::size_t i = 0; i < kAxisCount; ++i) memory_[i].next((*load_)[i], now.dt_s);
   }
   double sensor_g(const Moment& now, std::size_t axis) override {
     return mask_[axis] ? c_ * (memory_[axis].value() - now.a_nominal[axis]) : 0.0;
@@ -66,6 +67,7 @@ class Creep final : public Effect {
   std::array<bool, 3> mask_;
   double c_;
   std::array<Lag, 3> memory_;
+  std::optional<PerAxis<double>> load_;  ///< at the last rest, g
 };
 
 /// A proof mass that sticks: it follows the force only when the change exceeds its friction.

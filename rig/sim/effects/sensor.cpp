@@ -37,7 +37,7 @@ std::unique_ptr<Effect> cross_product(const EffectContext& p) {
 
 std::unique_ptr<Effect> hysteresis(const EffectContext& p) {
   return sensor_term(p, [w = p("w")](const Moment& now, std::size_t i) {
-    const double rise = now.a_nominal[i] - now.a_previous[i];
+    const double rise = now.a[i] - now.a_previous[i];
     if (std::abs(rise) < kSameForce_g) return 0.0;
     return rise > 0 ? w / 2 : -w / 2;
   });
@@ -80,7 +80,7 @@ std::unique_ptr<Effect> bias_step(const EffectContext& p) {
 
 std::unique_ptr<Effect> settling(const EffectContext& p) {
   return sensor_term(p, [c = p("c"), tau = p("tau")](const Moment& now, std::size_t i) {
-    return c * (now.a_previous[i] - now.a_nominal[i]) * std::exp(-now.t_in_pose_s / tau);
+    return c * (now.a_previous[i] - now.a[i]) * std::exp(-now.t_in_pose_s / tau);
   });
 }
 
