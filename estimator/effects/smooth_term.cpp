@@ -76,9 +76,13 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   for (Driver& each : instantaneous_drivers(log)) {
     const auto driver = std::make_shared<const Driver>(std::move(each));
     if (!any && !driver->varies()) continue;  // a variable that never varied drives nothing
-    for (const Target& target : {bias, scale, of_delta, of_h})
-      add_polynomials(driver, target, {1, 2, 3, 5});
     const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
+    for (const Target& target : {bias, scale, of_delta, of_h}) {
+      // A bias or scale that follows the time or a column in a straight line is a listed effect.
+      const bool listed = (clock || column) && target.form != TermForm::geometry;
+      if (any || !listed) add_polynomials(driver, target, {1});
+      add_polynomials(driver, target, {2, 3, 5});
+    }
     if (driver->recorded || clock) {
       for (std::size_t other = 1; other < kAxisCount; ++other)
         add_polynomials(driver, {.form = TermForm::scale, .other = other}, {1, 2});

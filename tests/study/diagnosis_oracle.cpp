@@ -19,17 +19,6 @@
 namespace plumbline::study {
 namespace {
 
-/// Mean of a recorded column over the run, which the estimator refers a column's effect to.
-double column_mean(const SampleTable& samples, const std::string& column) {
-  for (const Covariate& covariate : samples.covariates) {
-    if (covariate.name != column) continue;
-    double sum = 0;
-    for (const double value : covariate.value) sum += value;
-    return sum / static_cast<double>(covariate.value.size());
-  }
-  return 0;
-}
-
 /// The effect of the estimator that a simulated one is.
 const Effect* counterpart(const sim::EffectSetting& truth,
                           const std::vector<std::unique_ptr<Effect>>& of_columns) {
@@ -100,22 +89,6 @@ PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const auto& K = set.world.triad.K_V_per_g[i];
     truth[i] << K[0], K[1], K[2], set.world.triad.U0_V[i];
-  }
-  const sim::Room& room = set.world.room;
-  const std::map<std::string, double> nominal = {{"rh_pct", room.rh_pct},
-                                                 {"supply_V", room.supply_V},
-                                                 {"motor_A", room.hold_A + room.lift_A / 2}};
-  for (const sim::EffectSetting& effect : set.effects) {
-    if (!effect.id.starts_with("covariate:")) continue;
-    const std::string column = effect.id.substr(effect.id.find(':') + 1);
-    const auto found = nominal.find(column);
-    if (found == nominal.end()) continue;
-    const double shift =
-        effect.parameters.at("c") * (column_mean(set.set.run.samples, column) - found->second);
-    for (const std::size_t i : effect.axes) {
-      const auto own = static_cast<Eigen::Index>(i);
-      truth[i](effect.form == "scale" ? own : 3) += shift * set.world.triad.K_V_per_g[i][i];
-    }
   }
   return truth;
 }

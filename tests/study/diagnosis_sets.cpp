@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "estimator/error_figures.h"
@@ -225,6 +226,14 @@ Template make_template(const std::string& name, const SetDesign& design, const s
   return result;
 }
 
+/// What follows a column does so about the mean of the run.
+void refer_to_mean(const SampleTable& samples, sim::EffectSetting& effect) {
+  for (const Covariate& column : samples.covariates)
+    if (effect.id == "covariate:" + column.name)
+      effect.parameters["mean"] = std::accumulate(column.value.begin(), column.value.end(), 0.0) /
+                                  static_cast<double>(column.value.size());
+}
+
 /// √(Δχ²) that the change of the pose means is worth under the true noise, all axes together.
 double detectability(const MeasurementSet& with, const MeasurementSet& without,
                      const Yardstick& yard, const PerAxis<Eigen::MatrixXd>& V) {
@@ -382,6 +391,7 @@ StudySet make_set(const SetDesign& design) {
     const ScaledEffect scaled = scale_to_size(make_template(name, design, result.world, run_s),
                                               design, result.world, yard, result.covariance_V2);
     result.effects.push_back(scaled.setting);
+    refer_to_mean(result.plain.run.samples, result.effects.back());
     result.size.push_back(scaled.size);
     result.sigma.push_back(scaled.sigma);
     result.feasible = result.feasible && scaled.feasible;

@@ -1,4 +1,7 @@
 // Listed effects of the room and of recorded columns.
+#include <cmath>
+#include <limits>
+
 #include "rig/sim/effects/effect.h"
 #include "rig/sim/effects/terms.h"
 
@@ -12,8 +15,11 @@ std::unique_ptr<Effect> base_field(const EffectContext& p) {
   });
 }
 
-/// Follows one quantity of the room about the value it has on average.
-std::unique_ptr<Effect> follow(const EffectContext& p, double Moment::*quantity, double mean) {
+constexpr double kOfTheRoom = std::numeric_limits<double>::quiet_NaN();  ///< as it is set
+
+/// Follows one quantity of the room about its mean, which a run has about where the room is set.
+std::unique_ptr<Effect> follow(const EffectContext& p, double Moment::*quantity, double set) {
+  const double mean = std::isnan(p("mean")) ? set : p("mean");
   return sensor_term(p, [quantity, mean, c = p("c"), scale = p.setting.form == "scale"](
                             const Moment& now, std::size_t i) {
     return c * (now.*quantity - mean) * (scale ? now.a[i] : 1.0);
@@ -46,28 +52,28 @@ const EffectInfo kRoomEffects[] = {
      "temp_C",
      "bias or scale",
      true,
-     {{"c", "g/K or 1/K"}},
+     {{"c", "g/K or 1/K"}, {"mean", "C", false, kOfTheRoom}},
      follow_temperature},
     {"covariate:rh_pct",
      "c*(v - mean v), times a_i for form = \"scale\"",
      "rh_pct",
      "bias or scale",
      true,
-     {{"c", "g/% or 1/%"}},
+     {{"c", "g/% or 1/%"}, {"mean", "%", false, kOfTheRoom}},
      follow_humidity},
     {"covariate:supply_V",
      "c*(v - mean v), times a_i for form = \"scale\"",
      "supply_V",
      "bias or scale",
      true,
-     {{"c", "g/V or 1/V"}},
+     {{"c", "g/V or 1/V"}, {"mean", "V", false, kOfTheRoom}},
      follow_supply},
     {"covariate:motor_A",
      "c*(v - mean v), times a_i for form = \"scale\"",
      "motor_A",
      "bias or scale",
      true,
-     {{"c", "g/A or 1/A"}},
+     {{"c", "g/A or 1/A"}, {"mean", "A", false, kOfTheRoom}},
      follow_motor},
 };
 
