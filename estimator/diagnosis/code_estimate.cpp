@@ -12,13 +12,30 @@ namespace {
 
 enum Parameter : std::size_t { kLsb, kOrigin };  // of adc.quantization
 
+/// Without its lowest bit, and with all others, a converter rounds to steps of twice the size.
+bool lacks_lowest_bit(const VisitLog& log, const ActiveEffect& active) {
+  const std::vector<StuckBit>& stuck = log.codes[active.axis].stuck_bits;
+  return active.effect->id() == "adc.stuck_bit" && stuck.size() == 1 && stuck.front().bit == 0;
+}
+
 bool rounds(const VisitLog& log, const ActiveEffect& active) {
-  return active.effect->id() == "adc.quantization" && active.effect->certain(log, active.axis);
+  return (active.effect->id() == "adc.quantization" && active.effect->certain(log, active.axis)) ||
+         lacks_lowest_bit(log, active);
 }
 
 CodeScale scale_of(const VisitLog& log, const ActiveEffect& rounding) {
+  const double declared_V = log.adc->lsb_V();
+  if (lacks_lowest_bit(log, rounding)) {
+    // Code 2k is read for 2k + 1 or the other way round: a quarter of a step off the middle of
+    // both.
+    return {.origin_V = log.adc->min_V + 0.5 * declared_V,
+            .step_V = 2 * declared_V,
+            .off_scale = 0.3,
+            .lowest_V = log.adc->min_V,
+            .highest_V = log.adc->max_V - declared_V};
+  }
   // Readings are rounded to the declared step once more.
-  const double declared_V = log.adc->lsb_V(), step_V = rounding.p[kLsb];
+  const double step_V = rounding.p[kLsb];
   return {.origin_V = rounding.p[kOrigin],
           .step_V = step_V,
           .off_scale = 0.6 * declared_V / step_V,
@@ -67,8 +84,8 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
   const VisitLog& log = input.log;
   const auto n = std::ssize(log.visits);
   const Eigen::MatrixXd A = design_of(log, found.fit.parameters);
-  CodeEstimate codes{.before_rounding = found, .rounding = {}, .deviation_V = {}};
-  SearchResult& result = codes.before_rounding;
+  CodeEstimate codes{.before_converter = found, .left_out = {}, .deviation_V = {}};
+  SearchResult& result = codes.before_converter;
   bool any = false;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const auto rounded = rounded_axis(log, found, axis);
@@ -88,7 +105,7 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
     result.observed.mean_V[axis] = quantized->mean_V;
     result.whitening.set(axis, result.noise[axis].covariance);
     if (!rounded->effect) continue;
-    codes.rounding.push_back(*rounded->effect);
+    codes.left_out.push_back(*rounded->effect);
     const ActiveEffect& active = found.fit.parameters.effects[*rounded->effect];
     for (const auto& away : active.effect->one_deviation_away(log, axis, active.p)) {
       const double step = away[kLsb] / active.p[kLsb] - 1;
@@ -100,8 +117,8 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
     }
   }
   if (!any) return std::nullopt;
-  std::sort(codes.rounding.rbegin(), codes.rounding.rend());
-  for (const std::size_t e : codes.rounding) {
+  std::sort(codes.left_out.rbegin(), codes.left_out.rend());
+  for (const std::size_t e : codes.left_out) {
     result.fit.parameters = without_effect(result.fit.parameters, e);
     result.evidence.erase(result.evidence.begin() + static_cast<std::ptrdiff_t>(e));
   }
@@ -110,8 +127,8 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
   return codes;
 }
 
-EnlargedEstimate CodeEstimate::with_rounding(const EnlargedEstimate& estimate,
-                                             const SearchResult& found) const {
+EnlargedEstimate CodeEstimate::with_converter(const EnlargedEstimate& estimate,
+                                              const SearchResult& found) const {
   EnlargedEstimate whole{found.fit.parameters, found.fit.covariance};
   whole.parameters.twelve = estimate.parameters.twelve;
   std::vector<Eigen::Index> kept(12);  // their places among all free parameters
@@ -121,7 +138,7 @@ EnlargedEstimate CodeEstimate::with_rounding(const EnlargedEstimate& estimate,
   for (std::size_t e = 0; e < whole.parameters.effects.size(); ++e) {
     ActiveEffect& active = whole.parameters.effects[e];
     const Eigen::Index count = active.free_count();
-    if (std::find(rounding.begin(), rounding.end(), e) != rounding.end()) {
+    if (std::find(left_out.begin(), left_out.end(), e) != left_out.end()) {
       // The noise of the readings hardly depends on anything else.
       const Eigen::MatrixXd own = whole.covariance.block(place, place, count, count);
       whole.covariance.middleRows(place, count).setZero();

@@ -12,15 +12,16 @@ namespace plumbline {
 /// A model estimated from codes. What rounds is no part of `fit`, `noise` and `whitening`: a
 /// reading stands for the voltage before the converter.
 struct CodeEstimate {
-  SearchResult before_rounding;
-  std::vector<std::size_t> rounding;  ///< effects of the whole model that are left out
+  SearchResult before_converter;
+  std::vector<std::size_t> left_out;  ///< effects of the whole model that are left out
   /// Stacked: by how much the voltages are others where a step and its origin are one standard
   /// deviation away, each independent of the others.
   std::vector<Eigen::VectorXd> deviation_V;
 
   /// An estimate of that model as one of the whole model `found`. How far noise rounds the steps
   /// off stays as the means have it: noise of every kind does.
-  EnlargedEstimate with_rounding(const EnlargedEstimate& estimate, const SearchResult& found) const;
+  EnlargedEstimate with_converter(const EnlargedEstimate& estimate,
+                                  const SearchResult& found) const;
 };
 
 /// From the model as found. Near an edge between two codes the mean of a dwell is sharp and away

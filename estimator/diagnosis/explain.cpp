@@ -9,12 +9,14 @@
 #include "estimator/diagnosis/heldout.h"
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/separation.h"
+#include "estimator/diagnosis/stuck_bits.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/axis_tools.h"
+#include "estimator/fit/generalised_fit.h"
 #include "estimator/fit/joint_filter.h"
 #include "estimator/noise/chi_squared.h"
 
@@ -139,10 +141,12 @@ AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& searc
   return filter.parameters();
 }
 
-/// Effects that do not help where they were not fitted are no effects.
-void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
-                              const std::vector<Blocks>& partitions, SearchResult& found,
-                              std::vector<double>& gains) {
+/// Effects that do not help where they were not fitted are no effects. Says which were dropped, one
+/// after the other, by their places in what was left of the model.
+std::vector<std::size_t> drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
+                                                  const std::vector<Blocks>& partitions,
+                                                  SearchResult& found, std::vector<double>& gains) {
+  std::vector<std::size_t> all_dropped;
   for (bool dropped = true; dropped && !found.evidence.empty();) {
     dropped = false;
     gains.clear();
@@ -169,10 +173,12 @@ void drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
       }
       found.fit = std::move(without);
       found.evidence.erase(found.evidence.begin() + static_cast<std::ptrdiff_t>(k));
+      all_dropped.push_back(k);
       dropped = true;
       break;
     }
   }
+  return all_dropped;
 }
 
 /// By how much the readings are others where what the search chose, like where the steps of a
@@ -219,8 +225,13 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                            start, &input.pooled};
   SearchOptions search_options;
   search_options.seed = options.seed;
-  const CandidateList candidates = all_candidates(log, options.own_effects);
-  SearchResult found = search_effects(search, candidates, search_options);
+  auto beside_bits = search_beside_stuck_bits(
+      search, input.input, design_matrix(input.poses, input.input.description.gravity),
+      options.own_effects, search_options);
+  const CandidateList candidates =
+      beside_bits ? std::move(beside_bits->candidates) : all_candidates(log, options.own_effects);
+  SearchResult found = beside_bits ? std::move(beside_bits->found)
+                                   : search_effects(search, candidates, search_options);
   const auto without_effects = [&]() -> std::optional<WorstError> {
     result.diagnosis.not_found = detection_limits(search, candidates, found);
     return std::nullopt;
@@ -228,12 +239,12 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   if (found.evidence.empty()) return without_effects();
 
   std::vector<double> gains;
-  const std::size_t before_dropping = found.evidence.size();
   const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
   const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
-  drop_what_does_not_carry(search, heldout, partitions, found, gains);
-  if (found.evidence.size() != before_dropping)
+  const std::vector<std::size_t> dropped =
+      drop_what_does_not_carry(search, heldout, partitions, found, gains);
+  if (!dropped.empty())
     found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
   if (found.evidence.empty()) return without_effects();
   // Leaving out and the expected residual want the covariance under the noise that was used.
@@ -244,12 +255,18 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
         mps2_per_V(found.fit.parameters, i) * (stated_V[i] - mean_V[i]).replicate<2, 1>();
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
-  auto codes = estimate_from_codes(search, input.input.run, found);
+  std::optional<CodeEstimate> codes;
+  if (beside_bits) {
+    codes = std::move(beside_bits->given_back);
+    drop_effects(search, dropped, *codes);
+  } else {
+    codes = estimate_from_codes(search, input.input.run, found);
+  }
   if (codes) {
-    SearchResult& before = codes->before_rounding;
+    SearchResult& before = codes->before_converter;
     before.fit.covariance = with_allowances(
         search, before, prediction_jacobian(log, before.fit.parameters), codes->deviation_V);
-    static_cast<EnlargedEstimate&>(found.fit) = codes->with_rounding(before.fit, found);
+    static_cast<EnlargedEstimate&>(found.fit) = codes->with_converter(before.fit, found);
   } else {
     found.fit.covariance =
         with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
@@ -262,7 +279,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     diagnosis.history = history_of(log);
 
   // What certifies is estimated from these readings.
-  const SearchResult& estimated = codes ? codes->before_rounding : found;
+  const SearchResult& estimated = codes ? codes->before_converter : found;
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
   const auto estimated_V = predict_means_V(log, estimated.fit.parameters);
   EnlargedParameters bare = found.fit.parameters;
@@ -275,7 +292,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   if (joint) {
     EnlargedEstimate filter{estimated.fit.parameters, joint->covariance};
     filter.parameters.set_free_values(joint->value);
-    attach_filter(log, codes ? codes->with_rounding(filter, found) : filter, diagnosis);
+    attach_filter(log, codes ? codes->with_converter(filter, found) : filter, diagnosis);
   }
   PerAxis<bool> concerned{};
   for (const ActiveEffect& active : found.fit.parameters.effects)

@@ -402,5 +402,62 @@ TEST(DiagnosisStudy, WhatIsSmallBesideSlowNoiseCarriesOver) {
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
+// As part of the model, the bit turned every error of the model into one of its own weight.
+TEST(DiagnosisStudy, AStuckBitHidesNothingElseOnItsAxis) {
+  const SetDesign drift{.seed = 890062,
+                        .effects = {"sensor.scale_drift", "adc.stuck_bit"},
+                        .size = 3,
+                        .order = sim::RecordOrder::raster,
+                        .noise = NoiseKind::examples,
+                        .bits = 16,
+                        .samples_per_pose = 40,
+                        .static_s = 600};
+  SetDesign asymmetry = drift;
+  asymmetry.seed = 890043;
+  asymmetry.effects = {"sensor.asymmetry", "adc.stuck_bit"};
+  asymmetry.size = 10;
+  asymmetry.order = sim::RecordOrder::random;
+  asymmetry.static_s = 1800;
+  for (const SetDesign& design : {drift, asymmetry}) {
+    const SetOutcome outcome = run_set(design);
+    EXPECT_EQ(outcome.named, 2) << outcome.truth << " / " << outcome.found;
+    EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+    EXPECT_GE(outcome.K_within, 8);
+    EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+  }
+}
+
+// As linear as the supply is in what it does, and a listed effect of its column, beside kinks that
+// another centre of the line would move a little.
+TEST(DiagnosisStudy, AStraightLineInAColumnIsTheColumnsEffect) {
+  const SetOutcome outcome =
+      run_set({.seed = 880055,
+               .effects = {"adc.mains_pickup", "covariate:supply_V:scale", "sensor.dead_zone"},
+               .size = 10,
+               .order = sim::RecordOrder::random,
+               .noise = NoiseKind::coloured,
+               .bits = 12,
+               .samples_per_pose = 40,
+               .static_s = 300});
+  EXPECT_EQ(outcome.named, 3) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.unlisted, 0) << outcome.found;
+}
+
+// Beside a degree of error of the head a sensor remembers where the head stood, not where it was
+// sent.
+TEST(DiagnosisStudy, SettlingIsToldFromAnErrorOfTheHeadThatChangesWithEveryPose) {
+  const SetOutcome outcome =
+      run_set({.seed = 880023,
+               .effects = {"covariate:supply_V:scale", "rig.delta_periodic", "sensor.settling"},
+               .size = 10,
+               .order = sim::RecordOrder::snake,
+               .noise = NoiseKind::examples,
+               .bits = 12,
+               .samples_per_pose = 40,
+               .static_s = 300});
+  EXPECT_EQ(outcome.named, 3) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
 }  // namespace
 }  // namespace plumbline::study
