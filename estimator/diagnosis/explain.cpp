@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "estimator/diagnosis/code_estimate.h"
 #include "estimator/diagnosis/detection_limits.h"
@@ -141,8 +142,29 @@ AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& searc
   return filter.parameters();
 }
 
+/// A model without one of its effects, and the share of the left-out excess that the effect
+/// removes.
+struct Without {
+  EnlargedFit fit;
+  double gain = 0;
+};
+Without without_one(const SearchInput& search, const Heldout& heldout,
+                    const std::vector<Blocks>& partitions, const SearchResult& found,
+                    std::size_t k) {
+  const ActiveEffect& removed = found.fit.parameters.effects[k];
+  Without without{fit_enlarged(search.log, found.observed, found.whitening,
+                               without_effect(found.fit.parameters, k))};
+  if (!without.fit.determined) return without;
+  // What changes within the dwell may hardly be seen in the means.
+  without.gain = std::max(
+      heldout_gain(heldout.leave_out(without.fit, partitions),
+                   heldout.leave_out(found.fit, partitions), axes_of(removed)),
+      heldout_dwell_gain(search.log, found.observed, found.whitening, found.fit, k, partitions));
+  return without;
+}
+
 /// Effects that do not help where they were not fitted are no effects. Says which were dropped, one
-/// after the other, by their places in what was left of the model.
+/// after the other, by their places in what was left of the model; `gains`: of those that stay.
 std::vector<std::size_t> drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
                                                   const std::vector<Blocks>& partitions,
                                                   SearchResult& found, std::vector<double>& gains) {
@@ -150,28 +172,17 @@ std::vector<std::size_t> drop_what_does_not_carry(const SearchInput& search, con
   for (bool dropped = true; dropped && !found.evidence.empty();) {
     dropped = false;
     gains.clear();
-    const auto with = heldout.leave_out(found.fit, partitions);
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
-      const ActiveEffect removed = found.fit.parameters.effects[k];
-      EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening,
-                                         without_effect(found.fit.parameters, k));
-      if (!without.determined) {
-        gains.push_back(0);
-        continue;
-      }
-      // What changes within the dwell may hardly be seen in the means.
-      const double gain =
-          std::max(heldout_gain(heldout.leave_out(without, partitions), with, axes_of(removed)),
-                   heldout_dwell_gain(search.log, found.observed, found.whitening, found.fit, k,
-                                      partitions));
+      const ActiveEffect& active = found.fit.parameters.effects[k];
+      Without without = without_one(search, heldout, partitions, found, k);
       // One pose's own error cannot be predicted from other poses.
       const bool own =
-          removed.effect->concerns_one_visit() || removed.effect->certain(search.log, removed.axis);
-      if (gain > 0 || own) {
-        gains.push_back(std::max(gain, 0.0));
+          active.effect->concerns_one_visit() || active.effect->certain(search.log, active.axis);
+      if (without.gain > 0 || own || !without.fit.determined) {
+        gains.push_back(std::max(without.gain, 0.0));
         continue;
       }
-      found.fit = std::move(without);
+      found.fit = std::move(without.fit);
       found.evidence.erase(found.evidence.begin() + static_cast<std::ptrdiff_t>(k));
       all_dropped.push_back(k);
       dropped = true;
@@ -213,6 +224,56 @@ Eigen::MatrixXd with_allowances(const SearchInput& search, const SearchResult& f
   return covariance;
 }
 
+/// What a search found that carries over to poses which were left out.
+struct Carrying {
+  std::unique_ptr<const VisitLog> log;  ///< that `codes` are from; null: that of the search
+  CandidateList candidates;
+  SearchResult found;
+  std::vector<double> gains;  ///< on poses that were left out, of each effect
+  std::optional<CodeEstimate> codes;
+};
+
+Carrying carrying_effects(const ExplainInput& input, const SearchInput& search,
+                          const std::vector<Blocks>& partitions,
+                          const CalibrationOptions& options) {
+  SearchOptions search_options;
+  search_options.seed = options.seed;
+  Carrying result;
+  SearchResult& found = result.found;
+  std::vector<std::size_t> dropped;
+  if (auto beside_bits = search_beside_stuck_bits(
+          search, input.input, design_matrix(input.poses, input.input.description.gravity),
+          options.own_effects, search_options)) {
+    result.log = std::move(beside_bits->log);
+    result.candidates = std::move(beside_bits->candidates);
+    found = std::move(beside_bits->found);
+    result.codes = std::move(beside_bits->given_back);
+    // Edges of the bits hide what carries over.
+    SearchResult& without = result.codes->before_converter;
+    const SearchInput given_back{*result.log,      search.observed,       search.noise,
+                                 search.processes, search.positioning_V2, search.start,
+                                 search.pooled};
+    dropped = drop_what_does_not_carry(
+        given_back, Heldout(*result.log, without.observed.mean_V, without.whitening), partitions,
+        without, result.gains);
+    drop_effects(search, dropped, found, *result.codes);
+    const Heldout heldout(search.log, found.observed.mean_V, found.whitening);
+    for (std::size_t k = result.gains.size(); k < found.evidence.size(); ++k)
+      result.gains.push_back(
+          std::max(0.0, without_one(search, heldout, partitions, found, k).gain));
+  } else {
+    result.candidates = all_candidates(search.log, options.own_effects);
+    found = search_effects(search, result.candidates, search_options);
+    const Heldout heldout(search.log, found.observed.mean_V, found.whitening);
+    dropped = drop_what_does_not_carry(search, heldout, partitions, found, result.gains);
+    if (!found.evidence.empty()) result.codes = estimate_from_codes(search, input.input.run, found);
+  }
+  if (!dropped.empty())
+    found.responses =
+        candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
+  return result;
+}
+
 }  // namespace
 
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -223,30 +284,21 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
   const SearchInput search{log,   observed,     input.noise, input.processes, input.positioning_V2,
                            start, &input.pooled};
-  SearchOptions search_options;
-  search_options.seed = options.seed;
-  auto beside_bits = search_beside_stuck_bits(
-      search, input.input, design_matrix(input.poses, input.input.description.gravity),
-      options.own_effects, search_options);
-  const CandidateList candidates =
-      beside_bits ? std::move(beside_bits->candidates) : all_candidates(log, options.own_effects);
-  SearchResult found = beside_bits ? std::move(beside_bits->found)
-                                   : search_effects(search, candidates, search_options);
-  const auto without_effects = [&]() -> std::optional<WorstError> {
-    result.diagnosis.not_found = detection_limits(search, candidates, found);
+  const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
+  Carrying carrying = carrying_effects(input, search, partitions, options);
+  SearchResult& found = carrying.found;
+  if (found.evidence.empty()) {
+    result.diagnosis.not_found = detection_limits(search, carrying.candidates, found);
     return std::nullopt;
-  };
-  if (found.evidence.empty()) return without_effects();
+  }
+  // What is estimated from other readings has a log of its own.
+  const VisitLog& estimated_log = carrying.log ? *carrying.log : log;
+  const SearchInput estimated_search{estimated_log,         observed, input.noise,  input.processes,
+                                     search.positioning_V2, start,    &input.pooled};
+  std::optional<CodeEstimate>& codes = carrying.codes;
 
-  std::vector<double> gains;
   const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
-  const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
-  const std::vector<std::size_t> dropped =
-      drop_what_does_not_carry(search, heldout, partitions, found, gains);
-  if (!dropped.empty())
-    found.responses = candidate_responses(log, candidates, found.whitening, found.fit.parameters);
-  if (found.evidence.empty()) return without_effects();
   // Leaving out and the expected residual want the covariance under the noise that was used.
   const PerAxis<Eigen::VectorXd> stated_V = stated_means_V(search, found);
   auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
@@ -255,25 +307,19 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
         mps2_per_V(found.fit.parameters, i) * (stated_V[i] - mean_V[i]).replicate<2, 1>();
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
-  std::optional<CodeEstimate> codes;
-  if (beside_bits) {
-    codes = std::move(beside_bits->given_back);
-    drop_effects(search, dropped, *codes);
-  } else {
-    codes = estimate_from_codes(search, input.input.run, found);
-  }
   if (codes) {
     SearchResult& before = codes->before_converter;
     before.fit.covariance = with_allowances(
-        search, before, prediction_jacobian(log, before.fit.parameters), codes->deviation_V);
+        estimated_search, before, prediction_jacobian(estimated_log, before.fit.parameters),
+        codes->deviation_V);
     static_cast<EnlargedEstimate&>(found.fit) = codes->with_converter(before.fit, found);
   } else {
     found.fit.covariance =
         with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
   }
   Diagnosis diagnosis =
-      describe_findings(search, candidates, found, options.reach.value_or(reach_of(log)));
-  attach_gains(found.evidence, gains, diagnosis);
+      describe_findings(search, carrying.candidates, found, options.reach.value_or(reach_of(log)));
+  attach_gains(found.evidence, carrying.gains, diagnosis);
   if (std::any_of(found.fit.parameters.effects.begin(), found.fit.parameters.effects.end(),
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
     diagnosis.history = history_of(log);
@@ -281,14 +327,14 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   // What certifies is estimated from these readings.
   const SearchResult& estimated = codes ? codes->before_converter : found;
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
-  const auto estimated_V = predict_means_V(log, estimated.fit.parameters);
+  const auto estimated_V = predict_means_V(estimated_log, estimated.fit.parameters);
   EnlargedParameters bare = found.fit.parameters;
   bare.effects.clear();
   const auto twelve_V = predict_means_V(log, bare);
   const Gravity& gravity = input.input.description.gravity;
 
   const auto n = std::ssize(input.poses);
-  const auto joint = joint_estimate(input, search, estimated);
+  const auto joint = joint_estimate(input, estimated_search, estimated);
   if (joint) {
     EnlargedEstimate filter{estimated.fit.parameters, joint->covariance};
     filter.parameters.set_free_values(joint->value);
@@ -305,9 +351,10 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
     const auto first = 4 * static_cast<Eigen::Index>(i);
     result.final.ekf[i] = with_gravity(
-        joint ? AxisEstimate{joint->value.segment<4>(first),
-                             joint->covariance.block<4, 4>(first, first)}
-              : filter_estimate(input, search, estimated, estimated_V[i] - twelve_V[i], i),
+        joint
+            ? AxisEstimate{joint->value.segment<4>(first),
+                           joint->covariance.block<4, 4>(first, first)}
+            : filter_estimate(input, estimated_search, estimated, estimated_V[i] - twelve_V[i], i),
         gravity);
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
     const Eigen::VectorXd residual_mps2 = factor * (stated_V[i] - predicted_V[i]);

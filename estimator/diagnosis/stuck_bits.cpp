@@ -112,6 +112,13 @@ class BitsGivenBack {
         sharp_(with_sharp_bits(input.log)),
         run_(measured.run) {}
 
+  /// Whether readings stand for the voltage of their dwell, not for what it is at their instant.
+  bool blurs_dwells(std::size_t axis) const {
+    constexpr double kBlurs =
+        0.2;  // of the lowest bit's weight; 1 in 160 readings lies beyond half
+    return sharp_[axis] && raw_.input_sd_V[axis] >
+                               kBlurs * weight_V(raw_.codes[axis].stuck_bits.front(), *raw_.adc);
+  }
   bool any() const { return sharp_[0] || sharp_[1] || sharp_[2]; }
   bool on(std::size_t axis) const { return sharp_[axis]; }
   const MeasurementSet& run() const { return run_; }
@@ -316,6 +323,10 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
     limited.max_effects = options.max_effects;
   }
 
+  for (const ActiveEffect& active : without.fit.parameters.effects)
+    for (const std::size_t axis : axes_of(active))
+      if (active.effect->within_dwell() && bits.blurs_dwells(axis)) return std::nullopt;
+
   std::vector<Candidate>& candidates = result.candidates.candidates;
   std::erase_if(candidates, [&](const Candidate& c) { return c.effect == &stuck_bit; });
   const std::size_t first = candidates.size();
@@ -332,16 +343,14 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
 }
 
 void drop_effects(const SearchInput& input, const std::vector<std::size_t>& dropped,
-                  CodeEstimate& given_back) {
+                  SearchResult& found, CodeEstimate& given_back) {
   if (dropped.empty()) return;
-  SearchResult& without = given_back.before_converter;
   for (const std::size_t k : dropped) {
-    without.fit.parameters = without_effect(std::move(without.fit.parameters), k);
-    without.evidence.erase(without.evidence.begin() + static_cast<std::ptrdiff_t>(k));
+    found.fit.parameters = without_effect(std::move(found.fit.parameters), k);
+    found.evidence.erase(found.evidence.begin() + static_cast<std::ptrdiff_t>(k));
     for (std::size_t& bit : given_back.left_out) --bit;
   }
-  without.fit =
-      fit_enlarged(input.log, without.observed, without.whitening, without.fit.parameters);
+  found.fit = fit_enlarged(input.log, found.observed, found.whitening, found.fit.parameters);
 }
 
 }  // namespace plumbline

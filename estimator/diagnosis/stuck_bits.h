@@ -34,13 +34,15 @@ struct SearchBesideBits {
 /// Such a model is linear in what is looked for: a bit that is part of the model instead turns
 /// every error of the model on its edges into one of the bit's weight, in which what else there is
 /// on that axis hides. Searches anew as long as what was found moves readings to the other side of
-/// an edge. Nothing where no bit is stuck or noise smooths its edges; `own`: CalibrationOptions'.
+/// an edge. Nothing where no bit is stuck or noise smooths its edges, and where noise reaches over
+/// the bit and something changes within the dwells; `own`: CalibrationOptions'.
 std::optional<SearchBesideBits> search_beside_stuck_bits(
     const SearchInput& input, const CalibrationInput& measured, const Eigen::MatrixXd& A,
     const std::vector<std::shared_ptr<const Effect>>& own, const SearchOptions& options);
 
-/// Follows where effects were dropped from `found`, given by their places one after the other.
+/// Follows where effects were dropped from the model without the bits, given by their places one
+/// after the other.
 void drop_effects(const SearchInput& input, const std::vector<std::size_t>& dropped,
-                  CodeEstimate& given_back);
+                  SearchResult& found, CodeEstimate& given_back);
 
 }  // namespace plumbline
