@@ -25,22 +25,20 @@ bool rounds(const VisitLog& log, const ActiveEffect& active) {
 
 CodeScale scale_of(const VisitLog& log, const ActiveEffect& rounding) {
   const double declared_V = log.adc->lsb_V();
+  CodeScale scale = scale_of(*log.adc);
   if (lacks_lowest_bit(log, rounding)) {
     // Code 2k is read for 2k + 1 or the other way round: a quarter of a step off the middle of
     // both.
-    return {.origin_V = log.adc->min_V + 0.5 * declared_V,
-            .step_V = 2 * declared_V,
-            .off_scale = 0.3,
-            .lowest_V = log.adc->min_V,
-            .highest_V = log.adc->max_V - declared_V};
+    scale.origin_V = log.adc->min_V + 0.5 * declared_V;
+    scale.step_V = 2 * declared_V;
+    scale.off_scale = 0.3;
+    return scale;
   }
   // Readings are rounded to the declared step once more.
-  const double step_V = rounding.p[kLsb];
-  return {.origin_V = rounding.p[kOrigin],
-          .step_V = step_V,
-          .off_scale = 0.6 * declared_V / step_V,
-          .lowest_V = log.adc->min_V,
-          .highest_V = log.adc->max_V - declared_V};
+  scale.origin_V = rounding.p[kOrigin];
+  scale.step_V = rounding.p[kLsb];
+  scale.off_scale = 0.6 * declared_V / scale.step_V;
+  return scale;
 }
 
 /// An axis whose steps have edges, and the effect that says so, if one had to.
@@ -118,10 +116,7 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
   }
   if (!any) return std::nullopt;
   std::sort(codes.left_out.rbegin(), codes.left_out.rend());
-  for (const std::size_t e : codes.left_out) {
-    result.fit.parameters = without_effect(result.fit.parameters, e);
-    result.evidence.erase(result.evidence.begin() + static_cast<std::ptrdiff_t>(e));
-  }
+  for (const std::size_t e : codes.left_out) result.remove(e);
   result.fit = fit_enlarged(log, result.observed, result.whitening, result.fit.parameters);
   if (!result.fit.determined) return std::nullopt;
   return codes;

@@ -150,15 +150,14 @@ struct Without {
 };
 Without without_one(const SearchInput& search, const Heldout& heldout,
                     const std::vector<Blocks>& partitions, const SearchResult& found,
-                    std::size_t k) {
+                    const std::vector<LeftOut>& with, std::size_t k) {
   const ActiveEffect& removed = found.fit.parameters.effects[k];
   Without without{fit_enlarged(search.log, found.observed, found.whitening,
                                without_effect(found.fit.parameters, k))};
   if (!without.fit.determined) return without;
   // What changes within the dwell may hardly be seen in the means.
   without.gain = std::max(
-      heldout_gain(heldout.leave_out(without.fit, partitions),
-                   heldout.leave_out(found.fit, partitions), axes_of(removed)),
+      heldout_gain(heldout.leave_out(without.fit, partitions), with, axes_of(removed)),
       heldout_dwell_gain(search.log, found.observed, found.whitening, found.fit, k, partitions));
   return without;
 }
@@ -172,9 +171,10 @@ std::vector<std::size_t> drop_what_does_not_carry(const SearchInput& search, con
   for (bool dropped = true; dropped && !found.evidence.empty();) {
     dropped = false;
     gains.clear();
+    const auto with = heldout.leave_out(found.fit, partitions);
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
       const ActiveEffect& active = found.fit.parameters.effects[k];
-      Without without = without_one(search, heldout, partitions, found, k);
+      Without without = without_one(search, heldout, partitions, found, with, k);
       // One pose's own error cannot be predicted from other poses.
       const bool own =
           active.effect->concerns_one_visit() || active.effect->certain(search.log, active.axis);
@@ -182,8 +182,8 @@ std::vector<std::size_t> drop_what_does_not_carry(const SearchInput& search, con
         gains.push_back(std::max(without.gain, 0.0));
         continue;
       }
+      found.remove(k);
       found.fit = std::move(without.fit);
-      found.evidence.erase(found.evidence.begin() + static_cast<std::ptrdiff_t>(k));
       all_dropped.push_back(k);
       dropped = true;
       break;
@@ -224,54 +224,53 @@ Eigen::MatrixXd with_allowances(const SearchInput& search, const SearchResult& f
   return covariance;
 }
 
-/// What a search found that carries over to poses which were left out.
-struct Carrying {
+/// What a search found.
+struct Searched {
   std::unique_ptr<const VisitLog> log;  ///< that `codes` are from; null: that of the search
   CandidateList candidates;
   SearchResult found;
-  std::vector<double> gains;  ///< on poses that were left out, of each effect
   std::optional<CodeEstimate> codes;
 };
 
-Carrying carrying_effects(const ExplainInput& input, const SearchInput& search,
-                          const std::vector<Blocks>& partitions,
-                          const CalibrationOptions& options) {
+Searched search_readings(const ExplainInput& input, const SearchInput& search,
+                         const CalibrationOptions& options) {
   SearchOptions search_options;
   search_options.seed = options.seed;
-  Carrying result;
-  SearchResult& found = result.found;
-  std::vector<std::size_t> dropped;
   if (auto beside_bits = search_beside_stuck_bits(
           search, input.input, design_matrix(input.poses, input.input.description.gravity),
-          options.own_effects, search_options)) {
-    result.log = std::move(beside_bits->log);
-    result.candidates = std::move(beside_bits->candidates);
-    found = std::move(beside_bits->found);
-    result.codes = std::move(beside_bits->given_back);
+          options.own_effects, search_options))
+    return {std::move(beside_bits->log), std::move(beside_bits->candidates),
+            std::move(beside_bits->found), std::move(beside_bits->given_back)};
+  CandidateList candidates = all_candidates(search.log, options.own_effects);
+  SearchResult found = search_effects(search, candidates, search_options);
+  return {nullptr, std::move(candidates), std::move(found), std::nullopt};
+}
+
+/// Leaves of `searched` what carries over to poses that were left out; returns the gains there.
+/// `heldout` is that of what was found, `estimated` the input that the codes are from.
+std::vector<double> keep_what_carries(const SearchInput& search, const SearchInput& estimated,
+                                      const Heldout& heldout, const std::vector<Blocks>& partitions,
+                                      Searched& searched) {
+  SearchResult& found = searched.found;
+  std::vector<double> gains;
+  std::vector<std::size_t> dropped;
+  if (searched.codes) {
     // Edges of the bits hide what carries over.
-    SearchResult& without = result.codes->before_converter;
-    const SearchInput given_back{*result.log,      search.observed,       search.noise,
-                                 search.processes, search.positioning_V2, search.start,
-                                 search.pooled};
+    SearchResult& without = searched.codes->before_converter;
     dropped = drop_what_does_not_carry(
-        given_back, Heldout(*result.log, without.observed.mean_V, without.whitening), partitions,
-        without, result.gains);
-    drop_effects(search, dropped, found, *result.codes);
-    const Heldout heldout(search.log, found.observed.mean_V, found.whitening);
-    for (std::size_t k = result.gains.size(); k < found.evidence.size(); ++k)
-      result.gains.push_back(
-          std::max(0.0, without_one(search, heldout, partitions, found, k).gain));
+        estimated, Heldout(estimated.log, without.observed.mean_V, without.whitening), partitions,
+        without, gains);
+    drop_effects(search, dropped, found, *searched.codes);
+    const auto with = heldout.leave_out(found.fit, partitions);
+    for (std::size_t k = gains.size(); k < found.evidence.size(); ++k)
+      gains.push_back(std::max(0.0, without_one(search, heldout, partitions, found, with, k).gain));
   } else {
-    result.candidates = all_candidates(search.log, options.own_effects);
-    found = search_effects(search, result.candidates, search_options);
-    const Heldout heldout(search.log, found.observed.mean_V, found.whitening);
-    dropped = drop_what_does_not_carry(search, heldout, partitions, found, result.gains);
-    if (!found.evidence.empty()) result.codes = estimate_from_codes(search, input.input.run, found);
+    dropped = drop_what_does_not_carry(search, heldout, partitions, found, gains);
   }
   if (!dropped.empty())
     found.responses =
-        candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
-  return result;
+        candidate_responses(search.log, searched.candidates, found.whitening, found.fit.parameters);
+  return gains;
 }
 
 }  // namespace
@@ -284,21 +283,27 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
   const SearchInput search{log,   observed,     input.noise, input.processes, input.positioning_V2,
                            start, &input.pooled};
-  const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
-  Carrying carrying = carrying_effects(input, search, partitions, options);
-  SearchResult& found = carrying.found;
-  if (found.evidence.empty()) {
-    result.diagnosis.not_found = detection_limits(search, carrying.candidates, found);
+  Searched searched = search_readings(input, search, options);
+  SearchResult& found = searched.found;
+  const auto without_effects = [&]() -> std::optional<WorstError> {
+    result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
     return std::nullopt;
-  }
+  };
+  if (found.evidence.empty()) return without_effects();
+
   // What is estimated from other readings has a log of its own.
-  const VisitLog& estimated_log = carrying.log ? *carrying.log : log;
+  const VisitLog& estimated_log = searched.log ? *searched.log : log;
   const SearchInput estimated_search{estimated_log,         observed, input.noise,  input.processes,
                                      search.positioning_V2, start,    &input.pooled};
-  std::optional<CodeEstimate>& codes = carrying.codes;
-
   const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
+  const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
+  const std::vector<double> gains =
+      keep_what_carries(search, estimated_search, heldout, partitions, searched);
+  if (found.evidence.empty()) return without_effects();
+  std::optional<CodeEstimate>& codes = searched.codes;
+  if (!codes) codes = estimate_from_codes(search, input.input.run, found);
+
   // Leaving out and the expected residual want the covariance under the noise that was used.
   const PerAxis<Eigen::VectorXd> stated_V = stated_means_V(search, found);
   auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
@@ -318,8 +323,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
         with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
   }
   Diagnosis diagnosis =
-      describe_findings(search, carrying.candidates, found, options.reach.value_or(reach_of(log)));
-  attach_gains(found.evidence, carrying.gains, diagnosis);
+      describe_findings(search, searched.candidates, found, options.reach.value_or(reach_of(log)));
+  attach_gains(found.evidence, gains, diagnosis);
   if (std::any_of(found.fit.parameters.effects.begin(), found.fit.parameters.effects.end(),
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
     diagnosis.history = history_of(log);

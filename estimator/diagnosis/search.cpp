@@ -63,7 +63,6 @@ class Search {
 
   /// What the codes prove joins the model.
   void adopt_proven(std::size_t candidate) {
-    constexpr double kProven = 1e-300;  // what the codes prove needs no search
     const EnlargedFit with = fit_from_levels(
         input_.log, model_.stage().observed, model_.stage().whitening,
         with_effect(model_.stage().fit.parameters, list_.candidates[candidate].active()));

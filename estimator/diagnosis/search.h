@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/candidates.h"
@@ -41,6 +42,8 @@ struct SearchInput {
   const PerAxis<PooledNoise>* pooled = nullptr;
 };
 
+inline constexpr double kProven = 1e-300;  ///< p-value of what the codes prove without a search
+
 /// One effect in the model, and what speaks for it.
 struct Evidence {
   Candidate candidate;
@@ -59,6 +62,12 @@ struct SearchResult {
   PoseWhitening whitening;
   CandidateResponses responses;  ///< of the candidates beside the final model
   double p_best_rest = 1;        ///< p-value of the best candidate that was not taken
+
+  /// Takes an effect out of the model and its evidence; the rest is to be fitted anew.
+  void remove(std::size_t effect) {
+    fit.parameters = without_effect(std::move(fit.parameters), effect);
+    evidence.erase(evidence.begin() + static_cast<std::ptrdiff_t>(effect));
+  }
 };
 
 /// Deterministic in input and options.

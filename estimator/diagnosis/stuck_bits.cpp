@@ -17,8 +17,6 @@
 namespace plumbline {
 namespace {
 
-constexpr double kProven = 1e-300;  // what the codes prove needs no search
-
 const Effect& stuck_bit_effect() {
   const auto& all = effect_catalogue();
   return **std::find_if(all.begin(), all.end(),
@@ -37,6 +35,13 @@ std::vector<double> lacks_V(const std::vector<StuckBit>& stuck, const Adc& adc) 
     for (std::size_t k = all.size(); k-- > 0;) all.push_back(all[k] + lack_V);
   }
   return all;
+}
+
+/// The reading with what it may lack that brings it next to u_V.
+double next_to(double u_V, double reading_V, const std::vector<double>& lacks_V) {
+  return reading_V + *std::min_element(lacks_V.begin(), lacks_V.end(), [&](double a, double b) {
+           return std::abs(reading_V + a - u_V) < std::abs(reading_V + b - u_V);
+         });
 }
 
 /// The voltage of a dwell by the likelihood of its readings, each of which may lack something.
@@ -59,10 +64,7 @@ DwellVoltage likeliest(std::span<const double> readings_V, const std::vector<dou
     double sum_V = 0, spread_V2 = 0;
     dwell.log_likelihood = 0;
     for (const double reading_V : readings_V) {
-      double nearest_V = reading_V + lacks_V.front();
-      for (const double lack_V : lacks_V)
-        if (std::abs(reading_V + lack_V - dwell.u_V) < std::abs(nearest_V - dwell.u_V))
-          nearest_V = reading_V + lack_V;
+      const double nearest_V = next_to(dwell.u_V, reading_V, lacks_V);
       const double least = square((nearest_V - dwell.u_V) / sd_V);
       double weights = 0, weighted_V = 0, square_V2 = 0;
       for (const double lack_V : lacks_V) {
@@ -267,10 +269,7 @@ Eigen::VectorXd give_bits_back(const std::vector<StuckBit>& stuck, const Adc& ad
     }
     double sum_V = 0;
     for (double& reading_V : readings_V) {
-      const auto nearest = std::min_element(lacks.begin(), lacks.end(), [&](double a, double b) {
-        return std::abs(reading_V + a - dwell_V) < std::abs(reading_V + b - dwell_V);
-      });
-      reading_V += *nearest;
+      reading_V = next_to(dwell_V, reading_V, lacks);
       sum_V += reading_V;
     }
     // Where noise reaches over the bit the nearest is not always right.
@@ -299,7 +298,7 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
   limited.max_effects = std::min<std::size_t>(1, options.max_effects);
   // What is left of a bit follows the positions, as what is left of rounding does.
   limited.false_alarm_of_slow = options.false_alarm_of_slow_when_coarse;
-  for (int k = 0; k < kMostSearches; ++k) {
+  for (int searches = 1;; ++searches) {
     result.log = std::make_unique<const VisitLog>(make_visit_log(bits.run(), measured.description));
     const VisitLog& log = *result.log;
     const Observations observed = observe(bits.run(), log);
@@ -317,7 +316,7 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
     bool settled = true;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       if (bits.on(axis) && bits.about(axis, expected_V(log, without, axis))) settled = false;
-    if (!settled) continue;
+    if (!settled && searches < kMostSearches) continue;
     if (without.evidence.size() < limited.max_effects || limited.max_effects == options.max_effects)
       break;
     limited.max_effects = options.max_effects;
@@ -346,8 +345,7 @@ void drop_effects(const SearchInput& input, const std::vector<std::size_t>& drop
                   SearchResult& found, CodeEstimate& given_back) {
   if (dropped.empty()) return;
   for (const std::size_t k : dropped) {
-    found.fit.parameters = without_effect(std::move(found.fit.parameters), k);
-    found.evidence.erase(found.evidence.begin() + static_cast<std::ptrdiff_t>(k));
+    found.remove(k);
     for (std::size_t& bit : given_back.left_out) --bit;
   }
   found.fit = fit_enlarged(input.log, found.observed, found.whitening, found.fit.parameters);
