@@ -16,28 +16,39 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// A code boundary in standard deviations of the noise, and the probability beyond it on the side
+/// away from zero.
+struct Edge {
+  double z = 0;
+  double tail = 0;
+};
+
+Edge edge_at(double z) { return {z, normal_below(-std::abs(z))}; }
+
 /// log P(low < z < high) of the standard normal distribution, also far out in the tails.
-double log_between(double low, double high) {
-  if (low > 0) {
-    std::swap(low, high);
-    low = -low;
-    high = -high;
-  }
-  const double inside = normal_below(high) - normal_below(low);
+double log_between(const Edge& low, const Edge& high) {
+  const bool same_side = (low.z > 0) == (high.z > 0);
+  const double inside = same_side ? std::abs(high.tail - low.tail) : 1 - (low.tail + high.tail);
   if (inside > 1e-290) return std::log(inside);
   // Mills' ratio.
-  return -0.5 * high * high - std::log(-high) - 0.918938533204672742;
+  const double nearer = std::min(std::abs(low.z), std::abs(high.z));
+  return -0.5 * nearer * nearer - std::log(nearer) - 0.918938533204672742;
 }
 
 /// log-likelihood of a pose's codes when its true output is u.
 double log_likelihood(const CodeCounts& codes, double u, double sigma) {
-  double sum = 0;
+  double sum = 0, last_code = -kInfinity;
+  Edge high;
   for (std::size_t i = 0; i < codes.count.size(); ++i) {
     const auto& [code, count] = codes.count[i];
-    const double low = codes.at_low_end && i == 0 ? -kInfinity : (code - 0.5 - u) / sigma;
-    const double high =
-        codes.at_high_end && i + 1 == codes.count.size() ? kInfinity : (code + 0.5 - u) / sigma;
+    const bool adjacent = code == last_code + 1;  // its boundary is that of the code before
+    const Edge low = adjacent                     ? high
+                     : codes.at_low_end && i == 0 ? edge_at(-kInfinity)
+                                                  : edge_at((code - 0.5 - u) / sigma);
+    high = codes.at_high_end && i + 1 == codes.count.size() ? edge_at(kInfinity)
+                                                            : edge_at((code + 0.5 - u) / sigma);
     sum += count * log_between(low, high);
+    last_code = code;
   }
   return sum;
 }
