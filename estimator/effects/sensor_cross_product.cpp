@@ -14,8 +14,14 @@ class CrossProduct final : public Effect {
             {"k_yz", "g/g^2", ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    return {
-        {{effect::kSmallTerm, 0, 0}}, {{0, effect::kSmallTerm, 0}}, {{0, 0, effect::kSmallTerm}}};
+    // One product, two or all three.
+    std::vector<Hypothesis> found;
+    for (unsigned products = 1; products < 8; ++products) {
+      std::vector<double>& p = found.emplace_back().p;
+      for (const unsigned k : {0U, 1U, 2U})
+        p.push_back((products >> k & 1U) != 0 ? effect::kSmallTerm : 0);
+    }
+    return found;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const Eigen::Vector3d& a = input.a_g[input.visit];
