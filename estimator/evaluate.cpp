@@ -98,10 +98,12 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   result.head = head.value_or(BetweenSets::anywhere);
   Applied applied = apply(model, set, log, poses, result.head);
   if (!head && !model.history.visits.empty()) {
-    Applied from_there = apply(model, set, log, poses, BetweenSets::nowhere);
-    if (square_mps2(from_there.figures) < square_mps2(applied.figures)) {
-      applied = std::move(from_there);
-      result.head = BetweenSets::nowhere;
+    for (const BetweenSets from : {BetweenSets::nowhere, BetweenSets::home}) {
+      Applied from_there = apply(model, set, log, poses, from);
+      if (square_mps2(from_there.figures) < square_mps2(applied.figures)) {
+        applied = std::move(from_there);
+        result.head = from;
+      }
     }
   }
   result.after = applied.figures;

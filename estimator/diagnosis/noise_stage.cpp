@@ -72,6 +72,27 @@ Eigen::VectorXd crossing_variance_V2(const VisitLog& log, const EnlargedParamete
   return ((square_V2.array() - plain_V2) / weights).max(0);
 }
 
+/// Variance of the prediction of each mean from visits that effects leave open: by how much one way
+/// or the other differs from what the model says.
+PerAxis<Eigen::VectorXd> variance_at_ties_V2(const VisitLog& log,
+                                             const EnlargedParameters& parameters,
+                                             const PerAxis<Eigen::VectorXd>& predicted_V) {
+  PerAxis<Eigen::VectorXd> variance_V2;
+  variance_V2.fill(Eigen::VectorXd::Zero(predicted_V[0].size()));
+  for (std::size_t k = 0; k < parameters.effects.size(); ++k) {
+    const auto ways = parameters.effects[k].effect->ways_at_ties(parameters.effects[k].p);
+    for (const std::vector<double>& p : ways) {
+      EnlargedParameters one_way = parameters;
+      one_way.effects[k].p = p;
+      const PerAxis<Eigen::VectorXd> otherwise_V = predict_means_V(log, one_way);
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        variance_V2[i] +=
+            (otherwise_V[i] - predicted_V[i]).cwiseAbs2() / static_cast<double>(ways.size());
+    }
+  }
+  return variance_V2;
+}
+
 bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
   return std::any_of(parameters.effects.begin(), parameters.effects.end(),
                      [axis](const ActiveEffect& active) {
@@ -100,6 +121,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
   Stage stage;
   stage.observed = input.observed;
   stage.whitening.dwell_sd_V = dwell_scatter_V(input, parameters);
+  const PerAxis<Eigen::VectorXd> ties_V2 = variance_at_ties_V2(input.log, parameters, predicted);
   parallel_for(kAxisCount, [&](std::size_t i) {
     Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
     const bool freed = before.freed != nullptr && before.freed->coarse[i];
@@ -134,16 +156,17 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
         return noise.pool(residual_V, design,
                           before.start != nullptr ? &(*before.start)[i].power : nullptr);
       };
-      const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2;
+      if (ties_V2[i].maxCoeff() > 0) stage.crossing_V2[i] = ties_V2[i];
+      const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2 + ties_V2[i];
       stage.noise[i] = pool(own_V2);
       // Where the response is nothing but steps, only the visits near their edges say anything.
       if (has_effect_on(parameters, i) && !input.log.codes[i].coarser_lattice) {
         constexpr double kMatters = 0.1;
-        const double mean_V2 = stage.noise[i].covariance.diagonal().mean();
+        const double mean_V2 = (stage.noise[i].covariance.diagonal() - ties_V2[i]).mean();
         const Eigen::VectorXd crossing_V2 =
             crossing_variance_V2(input.log, parameters, i, predicted[i], std::sqrt(mean_V2));
         if (crossing_V2.maxCoeff() > kMatters * mean_V2) {
-          stage.crossing_V2[i] = crossing_V2;
+          stage.crossing_V2[i] = ties_V2[i] + crossing_V2;
           stage.noise[i] = pool(own_V2 + crossing_V2);
         }
       }

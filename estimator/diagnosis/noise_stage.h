@@ -14,8 +14,9 @@ struct Stage {
   PerAxis<Eigen::VectorXd> own_V2;           ///< variance that each mean has for itself
   PerAxis<bool> coarse{};                    ///< rounding matters
   PerAxis<std::optional<double>> beyond_V2;  ///< RoundingFree's
-  /// Further variance, in `noise` too, of means near a step of the response: slow noise decides on
-  /// which side they are. Empty where it does not matter.
+  /// Further variance, in `noise` too, of means near a step of the response, where slow noise
+  /// decides on which side they are, and of those that effects leave open (Effect::ways_at_ties).
+  /// Empty where it does not matter.
   PerAxis<Eigen::VectorXd> crossing_V2;
   EnlargedFit fit;
   PerAxis<PooledNoise> noise;

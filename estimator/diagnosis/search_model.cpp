@@ -217,6 +217,26 @@ void SearchModel::look_closer() {
   if (best != nullptr) adopt(best->parameters);
 }
 
+/// Leaves open what nothing recorded decides where that is clearly the likelier.
+void SearchModel::leave_ties_open() {
+  constexpr double kClearly = 10;  // of −2 ln L
+  for (std::size_t k = 0; k < chosen_.size(); ++k) {
+    const ActiveEffect& active = stage_.fit.parameters.effects[k];
+    const std::vector<double> open =
+        active.effect->with_ties_open(input_.log, active.axis, active.p);
+    if (open.empty()) continue;
+    EnlargedParameters parameters = stage_.fit.parameters;
+    parameters.effects[k].p = open;
+    const Before before{.start = &stage_.noise, .freed = &stage_};
+    const Stage as_it_is = settle_noise(input_, stage_.fit.parameters, before);
+    const Stage left_open = settle_noise(input_, parameters, before);
+    double gain = 0;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      gain += as_it_is.noise[axis].likelihood_deviance - left_open.noise[axis].likelihood_deviance;
+    if (gain > kClearly) adopt(parameters);
+  }
+}
+
 bool SearchModel::add(const Entry& with) { return exchange({}, with); }
 
 bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry& with) {
@@ -232,6 +252,7 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects,
     p_values_.push_back(newcomer.p);
   }
   look_closer();
+  leave_ties_open();
   return true;
 }
 

@@ -86,6 +86,7 @@ class SearchModel {
  private:
   bool adopt(const EnlargedParameters& parameters);
   void look_closer();
+  void leave_ties_open();
   void forget(std::size_t effect);
   /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;

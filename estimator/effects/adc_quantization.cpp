@@ -172,7 +172,8 @@ class Quantization final : public Effect {
   /// What the declared converter makes of a point of the coarser lattice.
   static double reading_V(const TermInput& input, const double* p, double point) {
     const double at_V = p[1] + p[0] * point;
-    // The readings at hand need not be those that the step was found in: theirs may begin elsewhere.
+    // The readings at hand need not be those that the step was found in: theirs may begin
+    // elsewhere.
     if (const auto& lattice = input.log.codes[input.axis].coarser_lattice) {
       const double place = std::round((at_V - lattice->origin_V) / lattice->step_V);
       if (place >= 0 && place < static_cast<double>(lattice->reading_V.size())) {

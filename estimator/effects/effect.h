@@ -117,6 +117,17 @@ class Effect {
                                                         const std::vector<double>& /*p*/) const {
     return {};
   }
+  /// The same, but open at the visits where nothing recorded decides the response (whether a force
+  /// rose that came back to what it was); empty where there are none or `p` leaves them open.
+  virtual std::vector<double> with_ties_open(const VisitLog&, std::size_t /*axis*/,
+                                             const std::vector<double>& /*p*/) const {
+    return {};
+  }
+  /// Where `p` leaves visits open: parameters one or the other of which is true of each of them,
+  /// and that say the same as `p` of all others.
+  virtual std::vector<std::vector<double>> ways_at_ties(const std::vector<double>& /*p*/) const {
+    return {};
+  }
   /// Whether it may stand in a model more than once for one axis: at another pose, say.
   virtual bool repeats() const { return false; }
   /// The same response by parameters as one would state them: positive amplitudes, angles within

@@ -111,9 +111,9 @@ Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<Dwe
 
 namespace {
 
-std::array<int, 2> direction_of_arrival(const VisitLog& log, std::size_t visit) {
+std::array<int, 3> direction_of_arrival(const VisitLog& log, std::size_t visit) {
   const Visit* before = log.before(visit);
-  return before ? direction_after(*before, log.visits[visit].delta_rad) : std::array<int, 2>{};
+  return before ? direction_after(*before, log.visits[visit].delta_rad) : std::array<int, 3>{};
 }
 
 void set_directions(VisitLog& log) {
@@ -123,11 +123,16 @@ void set_directions(VisitLog& log) {
 
 }  // namespace
 
-std::array<int, 2> direction_after(const Visit& before, double delta_rad) {
+std::array<int, 3> direction_after(const Visit& before, double delta_rad) {
   constexpr double kStill_rad = 1e-9;  // degrees that became radians and came back
-  std::array<int, 2> direction = before.delta_direction;
+  std::array<int, 3> direction = before.delta_direction;
   const double commanded = delta_rad - before.delta_rad;
-  const std::array<double, 2> turn = {std::remainder(commanded, 2 * std::numbers::pi), commanded};
+  double shorter = std::remainder(commanded, 2 * std::numbers::pi), other = shorter;
+  if (std::abs(std::abs(shorter) - std::numbers::pi) < kStill_rad) {
+    shorter = commanded;
+    other = -commanded;
+  }
+  const std::array<double, 3> turn = {shorter, commanded, other};
   for (std::size_t way = 0; way < direction.size(); ++way)
     if (std::abs(turn[way]) > kStill_rad) direction[way] = turn[way] > 0 ? 1 : -1;
   return direction;
@@ -167,6 +172,12 @@ void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log) {
     for (std::size_t c = 0; c < column.size(); ++c)
       visit.covariate[c] = earlier.covariate[column[c]];
     all.push_back(std::move(visit));
+  }
+  if (head == BetweenSets::home) {
+    Visit home = all.back();
+    home.delta_rad = home.h_rad = 0;
+    home.t_mean_s = home.t_arrival_s = 0.5 * (home.t_mean_s + log.first_s());
+    all.push_back(std::move(home));
   }
   log.visits.insert(log.visits.begin(), all.begin(), all.end());
   log.earlier = all.size();

@@ -27,8 +27,8 @@ struct Visit {
   double temperature_K = 0;  ///< mean of T − T₀; 0 when not recorded
   /// Sign of the last turn of δ that led here, 0 before the first one: [0] for a head that goes the
   /// shorter way round, [1] for one that goes from one commanded angle to the other within the
-  /// turn.
-  std::array<int, 2> delta_direction{};
+  /// turn; [2] as [0], but half a turn, of which both ways are alike, the other way round.
+  std::array<int, 3> delta_direction{};
   std::vector<double> covariate;  ///< mean over the dwell
   PerAxis<double> mean_V{};       ///< of the readings
 };
@@ -84,8 +84,8 @@ RunHistory history_of(const VisitLog& log);
 /// A log of these visits, of which nothing else is known.
 VisitLog log_of(const RunHistory& history);
 
-/// Where the head went between two sets.
-enum class BetweenSets { nowhere, anywhere };
+/// Where the head went between two sets: home is δ = h = 0.
+enum class BetweenSets { nowhere, home, anywhere };
 
 /// Puts the visits of an earlier set in front of the log's own, so that effects that remember them
 /// go on where they were. Nothing is done where they were not earlier on the same clock or lack a
@@ -93,7 +93,7 @@ enum class BetweenSets { nowhere, anywhere };
 void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log);
 
 /// Visit::delta_direction of a visit at `delta_rad` that comes next after `before`.
-std::array<int, 2> direction_after(const Visit& before, double delta_rad);
+std::array<int, 3> direction_after(const Visit& before, double delta_rad);
 
 /// For what changes slowly within a dwell of `samples` samples: samples × 5, orthonormal columns of
 /// zero sum. They span the steps after 1/32, 1/16 … 1/2 of the dwell, finest where transients after

@@ -71,7 +71,7 @@ void set_attitudes(ScalarData& data, const ScalarVector& nine) {
     Visit& visit = data.log.visits[k];
     visit.h_rad = std::asin(std::clamp(up.z(), -1.0, 1.0));
     visit.delta_rad = std::atan2(-up.y(), up.x());
-    visit.delta_direction = {direction, direction};
+    visit.delta_direction = {direction, direction, direction};
   }
 }
 
