@@ -195,7 +195,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
     for (int round = 0; round < (free.beyond_V2 ? kEdgeRounds : kRoundingRounds); ++round)
       free_means(experiment.A * ordinary.x);
     if (free.coarse && n > 4) {
-      work.record = without_record(identified);
+      work.record = record_beside_rounding(identified, *experiment.input.description.adc,
+                                           experiment.white_V[axis]);
       const NoisePool pool(experiment.processes, work.record,
                            work.positioning_V2 + free.variance_V2);
       const Eigen::MatrixXd V = pool.pool(work.y, experiment.A).covariance;

@@ -100,10 +100,12 @@ bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
                      });
 }
 
-/// What the static record says of the noise of an axis: nothing where rounding matters.
+/// What the static record says of the noise of an axis.
 NoiseModel record_of(const SearchInput& input, std::size_t axis, bool coarse) {
-  return coarse || input.log.codes[axis].coarser_lattice ? without_record(input.noise[axis])
-                                                         : input.noise[axis];
+  if (input.log.codes[axis].coarser_lattice) return without_record(input.noise[axis]);
+  return coarse ? record_beside_rounding(input.noise[axis], *input.log.adc,
+                                         input.log.sample_sd_V[axis])
+                : input.noise[axis];
 }
 
 }  // namespace

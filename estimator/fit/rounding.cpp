@@ -8,6 +8,7 @@
 #include "estimator/linear_algebra.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/noise/covariance.h"
+#include "estimator/noise/reml.h"
 #include "estimator/quantization/interval_fit.h"
 
 namespace plumbline {
@@ -124,6 +125,25 @@ double sd_before_rounding_V(double step_V, double recorded_V) {
 
 bool is_coarse_against(double step_V, double sample_sd_V) {
   return sd_before_rounding_V(step_V, sample_sd_V) <= kNoTrace * step_V;
+}
+
+NoiseModel record_beside_rounding(const NoiseModel& record, const Adc& adc, double sample_sd_V) {
+  constexpr double kLeastSlope = 0.5;  // of the readings by the voltage, at the record's place
+  constexpr int kHalvings = 30;
+  const CodeScale scale = scale_of(adc);
+  const double sigma_V = sd_before_rounding_V(scale.step_V, sample_sd_V);
+  if (record.descriptions.empty() || sigma_V < kSoftest * scale.step_V)
+    return without_record(record);
+  const auto rounding = [&](double value_V) {
+    return rounding_bias(value_V, scale.origin_V, scale.step_V, sigma_V);
+  };
+  double low_V = record.mean - 0.5 * scale.step_V, high_V = record.mean + 0.5 * scale.step_V;
+  for (int k = 0; k < kHalvings; ++k) {
+    const double middle_V = 0.5 * (low_V + high_V);
+    (middle_V + rounding(middle_V).bias < record.mean ? low_V : high_V) = middle_V;
+  }
+  const double slope = 1 + rounding(low_V).slope;
+  return slope < kLeastSlope ? without_record(record) : with_slow_noise_only(record, slope);
 }
 
 Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,

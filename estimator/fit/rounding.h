@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "estimator/measurement.h"
+#include "estimator/noise/noise_model.h"
 
 namespace plumbline {
 
@@ -36,6 +37,11 @@ struct RoundingFree {
 /// is known; a model that lacks an effect gets no correction and the whole variance of rounding.
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
                               const Adc& adc, double sample_sd_V, double samples_per_mean);
+
+/// What a static record says of the noise of other places when rounding matters: nothing of white
+/// noise, which depends on the place within the step, and of slow noise only where the record's
+/// own place lets it through. `sample_sd_V`: white noise of one reading as recorded.
+NoiseModel record_beside_rounding(const NoiseModel& record, const Adc& adc, double sample_sd_V);
 
 /// What each entry of correlated noise is expected to be given all the others, under `covariance`:
 /// r_k − (Σ⁻¹r)_k/(Σ⁻¹)_kk. Added to a model's prediction it says where in the converter's step a

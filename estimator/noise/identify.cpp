@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "estimator/noise/allan.h"
 #include "estimator/noise/chi_squared.h"
@@ -111,6 +112,8 @@ NoiseModel identify_noise(const std::vector<double>& record, double rate_hz) {
   NoiseModel model;
   model.rate_hz = rate_hz;
   model.source = "static record";
+  model.mean =
+      std::accumulate(record.begin(), record.end(), 0.0) / static_cast<double>(record.size());
   model.record = describe_record(search, record, rate_hz);
   const bool rolls_off = model.record.band_hz < 0.49 * rate_hz;
   const TermFit fit = fit_terms(

@@ -96,6 +96,7 @@ struct SpectrumBin {
   double square = 0;  ///< Σc², U²
   double cross = 0;   ///< Σc·m, m the coefficient of a ramp of 1 U/s
   double ramp = 0;    ///< Σm²
+  double known = 0;   ///< variance of a coefficient beyond the powers that are asked for, U²
   /// Mean variance of a coefficient for Q², N², B², K² = 1.
   Eigen::Vector4d density = Eigen::Vector4d::Zero();
 };
@@ -126,6 +127,7 @@ struct NoiseModel {
   double p_value = 1;
   bool adequate = false;  ///< the terms describe the record
   std::string source;     ///< "static record", "bursts at the poses" or "none"
+  double mean = 0;        ///< of the static record, U
   std::string remark;     ///< what a person should know: too short, constant, a periodic line …
 
   /// All that the static record shows, for a report; without one, nothing.

@@ -187,7 +187,9 @@ NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power) const {
   Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
   if (densities_.size() == 0) return point;
   const std::vector<SpectrumBin>& bins = model_.descriptions.front().bins;
-  const Eigen::VectorXd variance = densities_ * power;
+  Eigen::VectorXd variance = densities_ * power;
+  for (Eigen::Index j = 0; j < variance.size(); ++j)
+    variance(j) += bins[static_cast<std::size_t>(j)].known;
   // The straight line is profiled out; what is left of it gives back one degree of freedom.
   double cross = 0, ramp = 0;
   for (Eigen::Index j = 0; j < variance.size(); ++j) {
@@ -444,6 +446,22 @@ PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& m
 NoiseModel without_record(NoiseModel model) {
   model.descriptions.clear();
   model.Q.value = model.N.value = model.B.value = model.K.value = 0;
+  return model;
+}
+
+NoiseModel with_slow_noise_only(NoiseModel model, double slope) {
+  for (SpectrumDescription& description : model.descriptions) {
+    for (SpectrumBin& bin : description.bins) {
+      bin.known = (description.power.head<2>().dot(bin.density.head<2>())) / square(slope);
+      bin.density.head<2>().setZero();
+      bin.square /= square(slope);
+      bin.cross /= slope;
+    }
+  }
+  model.Q.value = model.N.value = 0;
+  model.B.value /= slope;
+  model.K.value /= slope;
+  model.R.value /= slope;
   return model;
 }
 

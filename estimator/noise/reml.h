@@ -85,7 +85,9 @@ class NoisePool {
                  const Eigen::MatrixXd& design) const;
   Eigen::VectorXd starting_powers() const;
   /// The window means cannot tell quantization from white noise: without a record it stays at zero.
-  bool quantization_is_free() const { return densities_.size() > 0; }
+  bool quantization_is_free() const {
+    return densities_.size() > 0 && densities_.col(kTermQ).sum() > 0;
+  }
   /// By how much −2 ln of the restricted likelihood is better with the slow processes of `found`
   /// than without any.
   double gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
@@ -103,6 +105,11 @@ class NoisePool {
 
 /// A model that knows nothing of the noise but leaves all of it to the run.
 NoiseModel without_record(NoiseModel model);
+
+/// A model that knows of the record only what changes slowly, for channels that make of a slow
+/// change `slope` times what they make of it on average (a coarse converter, at the record's place
+/// within the step) and of white noise something else. Precondition: slope > 0.
+NoiseModel with_slow_noise_only(NoiseModel model, double slope);
 
 /// The same noise in the terms that the eight-state filter knows: white noise, one walk or the
 /// strongest Gauss-Markov process in its place, and flicker for the others.
