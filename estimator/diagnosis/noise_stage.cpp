@@ -39,7 +39,15 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
     for (Eigen::Index d = 0; d < sd_V[i].size(); ++d) {
       const Eigen::ArrayXd off =
           (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).array().abs();
-      const auto count = static_cast<double>(off.size());
+      // Short dwells do not resolve the finest contrasts: theirs are zero.
+      const auto count = static_cast<double>(std::count_if(
+          input.log.visits.begin(), input.log.visits.end(), [&](const Visit& visit) {
+            return input.log.contrasts.at(visit.count).col(d).squaredNorm() > 0;
+          }));
+      if (count == 0) {
+        sd_V[i](d) = 1;
+        continue;
+      }
       const double rms = std::sqrt(off.square().sum() / count);
       const double clipped = std::sqrt(off.min(4 * rms).square().sum() / count);
       // Contrasts that are all zero (single readings) carry no information.
