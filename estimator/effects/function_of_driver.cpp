@@ -345,6 +345,11 @@ class Step final : public FunctionOfDriver {
     std::vector<Hypothesis> others;
     for (const double ratio : {0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0})
       others.push_back({{found.p[0], ratio * found.p[1], found.p[2]}});
+    // Between two readings nothing moves a sharp step: it is tried at every place.
+    constexpr double kSharp = 0.08;
+    constexpr int kPlaces = 8;  // on either side
+    for (int place = -kPlaces; place <= kPlaces; ++place)
+      others.push_back({{found.p[0] + 0.25 * place * found.p[1], kSharp * found.p[1], found.p[2]}});
     return others;
   }
 

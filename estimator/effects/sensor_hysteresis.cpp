@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "estimator/effects/effect.h"
 
@@ -21,29 +23,45 @@ class Hysteresis final : public Effect {
             {"ties", "", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    bool ties = false;
-    for (std::size_t k = 1; k < log.visits.size(); ++k)
-      ties |= std::abs(commanded_g(log, k, axis) - commanded_g(log, k - 1, axis)) < kSameForce_g;
     std::vector<Hypothesis> found;
-    for (const Ties at_ties : {kNothing, kAsBefore})
+    const std::vector<double> changes = commanded_changes(log, axis);
+    const auto count = [&](double change) {
+      return std::count(changes.begin(), changes.end(), change);
+    };
+    const bool both_ways = std::min(count(1), count(-1)) >= kFewest;
+    for (const Ties ties : {kNothing, kAsBefore}) {
+      // What never fell is left with the same from the first rise on: a step in time.
+      if (ties == kAsBefore && (count(0) == 0 || !both_ways)) continue;
+      if (ties == kNothing &&
+          std::ssize(changes) - std::max({count(-1), count(0), count(1)}) < kFewest)
+        continue;
       for (const Start start : {kUnknown, kFromZero})
-        if (ties || at_ties == kNothing)
-          found.push_back(
-              {{effect::kSmallTerm, static_cast<double>(start), static_cast<double>(at_ties)}});
+        found.push_back(
+            {{effect::kSmallTerm, static_cast<double>(start), static_cast<double>(ties)}});
+    }
     return found;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const auto ties = static_cast<Ties>(std::lround(p[2]));
-    double sign = change_at(input, input.visit, p);
-    if (ties >= kOpen && is_open(input, p))
-      return ties == kOpen ? 0 : 0.5 * (ties == kRose ? p[0] : -p[0]);
-    for (std::size_t k = input.visit; ties == kAsBefore && sign == 0 && k > 0; --k)
-      sign = change_at(input, k - 1, p);
-    return 0.5 * sign * p[0];
+    if (ties == kAsBefore) {
+      double left = 0;
+      for (std::size_t k = input.visit + 1; k-- > 0 && left == 0;)
+        left = commanded_change(input.log, k, input.axis, p);
+      return 0.5 * left * p[0];
+    }
+    const double change = true_change(input, p);
+    if (ties == kNothing) return 0.5 * change * p[0];
+    const bool is_open =
+        change == 0 || change != commanded_change(input.log, input.visit, input.axis, p);
+    if (!is_open) return 0.5 * change * p[0];
+    return ties == kOpen ? 0 : 0.5 * (ties == kRose ? p[0] : -p[0]);
   }
-  std::vector<double> with_ties_open(const VisitLog&, std::size_t,
+  std::vector<double> with_ties_open(const VisitLog& log, std::size_t axis,
                                      const std::vector<double>& p) const override {
-    if (std::lround(p[2]) > kAsBefore) return {};
+    constexpr std::ptrdiff_t kOneIn = 5;  // with more the size of the effect is that of noise
+    const std::vector<double> changes = commanded_changes(log, axis);
+    const auto ties = std::count(changes.begin(), changes.end(), 0.0);
+    if (std::lround(p[2]) > kAsBefore || ties * kOneIn > std::ssize(changes)) return {};
     return {p[0], p[1], kOpen};
   }
   std::vector<std::vector<double>> ways_at_ties(const std::vector<double>& p) const override {
@@ -54,34 +72,48 @@ class Hysteresis final : public Effect {
  private:
   /// How the head came to its first pose, which nothing recorded says.
   enum Start { kUnknown, kFromZero };
-  /// What is left where the force came back to what it was: nothing, or what was left before.
-  /// Symmetry brings it back often: two poses in a row at one h for z, cos 10° cos 20° =
-  /// cos 20° cos 10° for x.
+  /// What is left where the force came back to what it was: nothing, or what was left before, which
+  /// is by commanded angles, since true ones never come back. Symmetry brings it back often: two
+  /// poses in a row at one h for z, cos 10° cos 20° = cos 20° cos 10° for x.
   enum Ties { kNothing, kAsBefore, kOpen, kRose, kFell };
+  /// Visits at which something else is left than at most others: fewer may have any fault.
+  static constexpr std::ptrdiff_t kFewest = 5;
 
+  /// What the force did on the way: 1 it rose, −1 it fell, 0 neither, or nobody knows.
+  static double sign_of(double rise_g) {
+    return std::abs(rise_g) < kSameForce_g ? 0 : (rise_g > 0 ? 1 : -1);
+  }
   static double commanded_g(const VisitLog& log, std::size_t visit, std::size_t axis) {
     const Visit& at = log.visits[visit];
     return specific_force_g({.delta_rad = at.delta_rad, .h_rad = at.h_rad},
                             log.gamma)(static_cast<Eigen::Index>(axis));
   }
-  /// What the force did on the way: 1 it rose, −1 it fell, 0 neither, or nobody knows.
-  static double sign_of(double rise_g) {
-    return std::abs(rise_g) < kSameForce_g ? 0 : (rise_g > 0 ? 1 : -1);
+  /// With how the head came to the first visit.
+  static double at_the_start(const VisitLog& log, double first_g, std::size_t axis,
+                             const double* p) {
+    return p[1] < 0.5 ? 0
+                      : sign_of(first_g -
+                                Eigen::Vector3d(log.gamma, 0, 0)(static_cast<Eigen::Index>(axis)));
   }
-  static double change_at(const TermInput& input, std::size_t visit, const double* p) {
+  static double commanded_change(const VisitLog& log, std::size_t visit, std::size_t axis,
+                                 const double* p) {
+    const double now_g = commanded_g(log, visit, axis);
+    return log.before(visit) != nullptr ? sign_of(now_g - commanded_g(log, visit - 1, axis))
+                                        : at_the_start(log, now_g, axis, p);
+  }
+  static double true_change(const TermInput& input, const double* p) {
     const auto i = static_cast<Eigen::Index>(input.axis);
-    if (input.log.before(visit) != nullptr)
-      return sign_of(input.a_g[visit](i) - input.a_g[visit - 1](i));
-    if (p[1] < 0.5) return 0;
-    return sign_of(input.a_g[visit](i) - Eigen::Vector3d(input.log.gamma, 0, 0)(i));
+    const double now_g = input.a_g[input.visit](i);
+    return input.log.before(input.visit) != nullptr ? sign_of(now_g - input.a_g[input.visit - 1](i))
+                                                    : at_the_start(input.log, now_g, input.axis, p);
   }
-  /// Whether the commanded force says otherwise than the true one, or neither says anything.
-  static bool is_open(const TermInput& input, const double* p) {
-    const double sign = change_at(input, input.visit, p);
-    if (sign == 0) return true;
-    if (input.log.before(input.visit) == nullptr) return false;
-    return sign_of(commanded_g(input.log, input.visit, input.axis) -
-                   commanded_g(input.log, input.visit - 1, input.axis)) != sign;
+  /// By the commanded angles, for every visit but the first.
+  static std::vector<double> commanded_changes(const VisitLog& log, std::size_t axis) {
+    const double from_unknown[] = {0, kUnknown};
+    std::vector<double> changes;
+    for (std::size_t k = 1; k < log.visits.size(); ++k)
+      changes.push_back(commanded_change(log, k, axis, from_unknown));
+    return changes;
   }
 };
 

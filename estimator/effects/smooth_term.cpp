@@ -1,5 +1,6 @@
 #include "estimator/effects/smooth_term.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -116,6 +117,14 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
     if (driver->angle) {
       for (const Target& target : {bias, of_delta, of_h}) add(bell(driver, target));
       for (const Target& target : {of_roll, of_skew}) add_polynomials(driver, target, {1, 2});
+    }
+    if (driver->name == "h_deg") {
+      // Second to eighth harmonic of the turn that is seen in part; the first is a listed effect.
+      const auto [low, high] =
+          std::minmax_element(driver->value[0].begin(), driver->value[0].end());
+      const double turns = driver->varies() ? (*high - *low) / effect::kTurn_rad : 1;
+      for (const Target& target : {bias, of_h})
+        add(wave(driver, target, {2 * turns, turns, 8 * turns}));
     }
   }
   // What winds up with the spindle does not know that 360° are 0°.
