@@ -69,11 +69,13 @@ class Backlash final : public Effect {
     const bool one_way = same_directions(log, 0, 1);
     std::vector<std::vector<double>> open;
     const bool halves = !same_directions(log, kShorter, kShorterOtherHalf);
-    for (const double way : {0.0, 1.0, 2.0, p[1]}) {
+    for (std::size_t way = 0; way <= kOpenWay; ++way) {
       for (int start = 0; start < kStarts; ++start) {
-        const std::vector<double> other = {p[0], way, static_cast<double>(start)};
-        const bool same_way = way == p[1] || (!halves && way != 1 && p[1] != 1);
-        if (other != p && (one_way || same_way)) open.push_back(other);
+        const std::vector<double> other = {p[0], static_cast<double>(way),
+                                           static_cast<double>(start)};
+        const bool same_way = other[1] == p[1] || (!halves && way != kWithinTheTurn && p[1] != 1);
+        const bool takes_one = way != kOpenWay || other[1] == p[1];
+        if (other != p && takes_one && (one_way || same_way)) open.push_back(other);
       }
     }
     return open;

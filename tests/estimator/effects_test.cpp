@@ -222,6 +222,17 @@ TEST(VisitLog, ApproachesByTheShorterWayRound) {
   EXPECT_EQ(log.visits[3].delta_direction[0], -1);
 }
 
+TEST(VisitLog, HalfATurnGoesAsCommandedOrTheOtherWayRound) {
+  RunHistory run;
+  for (const double delta : {10.0, 190.0, 10.0}) {
+    run.visits.emplace_back();
+    run.visits.back().delta_rad = delta * std::numbers::pi / 180;
+  }
+  const VisitLog log = log_of(run);
+  EXPECT_THAT(log.visits[1].delta_direction, ElementsAre(1, 1, -1));
+  EXPECT_THAT(log.visits[2].delta_direction, ElementsAre(-1, -1, 1));
+}
+
 /// Everything that remembers, on one log.
 struct Remembering {
   VisitLog log;
@@ -317,9 +328,54 @@ TEST(Backlash, ARunThatNeverGoesTheLongWayLeavesOpenWhichWayItIs) {
   const std::vector<double> found = {0.1, 0, 0};
   const auto other_way = Contains(ElementsAre(0.1, 1, 0));
   EXPECT_THAT(backlash.left_open_by(run_through({0, 120, 240, 120, 0}), found),
-              AllOf(SizeIs(5), other_way));
+              AllOf(SizeIs(8), other_way));
   EXPECT_THAT(backlash.left_open_by(run_through({0, 120, 240, 0, 120}), found),
-              AllOf(SizeIs(2), Not(other_way)));
+              AllOf(SizeIs(5), Not(other_way)));
+}
+
+// Half a turn is as short one way as the other: a head may take either.
+TEST(Backlash, MayBeLeftOpenWhereBothWaysAreAlike) {
+  const Effect& backlash = catalogued("rig.backlash");
+  RunHistory run;
+  for (const double delta : {0.0, 100.0, 280.0, 280.0, 300.0, 120.0}) {
+    run.visits.emplace_back();
+    run.visits.back().delta_rad = delta * std::numbers::pi / 180;
+  }
+  const VisitLog log = log_of(run);
+  const std::vector<double> found = {0.1, 0, 0};
+  const std::vector<double> open = backlash.with_ties_open(log, 0, found);
+  ASSERT_FALSE(open.empty());
+  EXPECT_TRUE(backlash.with_ties_open(log, 0, open).empty());
+  const auto turned_deg = [&](std::size_t visit, const std::vector<double>& p) {
+    HeadGeometry head;
+    backlash.displace(log, visit, p.data(), head);
+    return head.delta_rad * 180 / std::numbers::pi;
+  };
+  for (const std::size_t visit : {1U, 4U}) EXPECT_NEAR(turned_deg(visit, open), 0.05, 1e-12);
+  for (const std::size_t visit : {2U, 3U, 5U}) EXPECT_EQ(turned_deg(visit, open), 0);
+  const auto ways = backlash.ways_at_ties(open);
+  ASSERT_EQ(ways.size(), 2U);
+  for (std::size_t visit = 1; visit < log.visits.size(); ++visit)
+    EXPECT_NEAR(0.5 * (turned_deg(visit, ways[0]) + turned_deg(visit, ways[1])),
+                turned_deg(visit, open), 1e-12);
+}
+
+// Codes are numbered from the lowest that a set shows, and another set shows another.
+TEST(Quantization, IsTheSameInASetThatBeginsAtAnotherCode) {
+  constexpr double kStep_V = 4 * 5.0 / 65536;
+  VisitLog found = example_log(), later = found;
+  const auto lattice_from = [](double origin_V) {
+    Lattice lattice{kStep_V, origin_V};
+    for (int k = 0; k < 300; ++k) lattice.reading_V.push_back(origin_V + kStep_V * k);
+    return lattice;
+  };
+  const double origin_V = -5 + 8000 * kStep_V;
+  found.codes[0].coarser_lattice = lattice_from(origin_V);
+  later.codes[0].coarser_lattice = lattice_from(origin_V + 7 * kStep_V);
+  EnlargedParameters with = twelve();
+  with.effects = {
+      activate(catalogued("adc.quantization"), 0, {{kStep_V, origin_V, 0.2 * kStep_V}})};
+  EXPECT_LT((predict_means_V(found, with)[0] - predict_means_V(later, with)[0]).norm(), 1e-12);
 }
 
 // What hardly changes over a run would take the place of the 12 parameters.

@@ -205,6 +205,14 @@ TEST(Evaluate, TellsFromTheReadingsWhetherTheHeadWentElsewhere) {
   const MeasurementSet later = poses_of(whole, 81, 90);
   const Evaluation moved = evaluate(model, later, data.description);
   EXPECT_EQ(moved.head, BetweenSets::anywhere);
+  // The head was sent home, where the run had begun, and went on from there as it did then.
+  MeasurementSet from_home = poses_of(whole, 1, 20);
+  for (double& t_s : from_home.samples.t_s) t_s += 300;
+  const Evaluation homed = evaluate(model, from_home, data.description);
+  EXPECT_EQ(homed.head, BetweenSets::home);
+  EXPECT_LT(homed.after.pose_max_abs_mps2[0],
+            evaluate(model, from_home, data.description, BetweenSets::anywhere)
+                .after.pose_max_abs_mps2[0]);
   // Told what is not so, the first pose is wrong.
   for (const auto& [told, readings, truth] : {std::tuple(BetweenSets::anywhere, &next, &stayed),
                                               std::tuple(BetweenSets::nowhere, &later, &moved)}) {

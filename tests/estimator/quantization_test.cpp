@@ -11,6 +11,7 @@
 #include "estimator/fit/least_squares.h"
 #include "estimator/fit/rounding.h"
 #include "estimator/noise/covariance.h"
+#include "estimator/noise/identify.h"
 #include "estimator/quantization/interval_fit.h"
 #include "tests/estimator/synthetic_run.h"
 
@@ -173,6 +174,38 @@ TEST(RoundingFree, MeansInsideAStepWithEdgesCountForLittle) {
   // Errors are those of the means as measured: a step is about that wide.
   const double stated_V2 = *free.beyond_V2 + free.variance_V2.mean();
   EXPECT_NEAR(stated_V2, (mean_V - true_V).squaredNorm() / kMeans, 0.3 * stated_V2);
+}
+
+// What a coarse converter says of white noise depends on the place within its step; what it says of
+// slow noise only by how much of it the place lets through.
+TEST(RecordBesideRounding, KeepsTheSlowNoise) {
+  constexpr Adc adc{12, -5, 0};
+  constexpr double kRate_hz = 100, kWalk_V = 3e-5;
+  const double step_V = adc.lsb_V();
+  // Noise of a reading, and its scatter over all places within the step; in steps.
+  for (const auto& [sigma, recorded] : {std::pair(0.1, 0.2), {0.45, 0.53}}) {
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    std::vector<double> record;
+    double walk_V = -2.5 + 0.2 * step_V;
+    for (int k = 0; k < 30000; ++k) {
+      walk_V += kWalk_V / std::sqrt(kRate_hz) * normal(random);
+      record.push_back(step_V * std::round((walk_V + sigma * step_V * normal(random)) / step_V));
+    }
+    const NoiseModel whole = identify_noise(record, kRate_hz);
+    const NoiseModel kept = record_beside_rounding(whole, adc, recorded * step_V);
+    EXPECT_EQ(kept.N.value, 0);
+    if (sigma < 0.15) {
+      EXPECT_TRUE(kept.descriptions.empty()) << "steps with edges hide what is slow, too";
+      continue;
+    }
+    ASSERT_FALSE(kept.descriptions.empty());
+    EXPECT_NEAR(kept.K.value, kWalk_V, 0.5 * kWalk_V);
+    for (const SpectrumBin& bin : kept.descriptions.front().bins) {
+      EXPECT_EQ(bin.density(kTermN), 0);
+      EXPECT_GT(bin.known, 0);
+    }
+  }
 }
 
 TEST(IntervalFit, AsGoodAsLeastSquaresWhereNoiseSmoothsTheSteps) {

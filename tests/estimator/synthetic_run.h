@@ -1,9 +1,12 @@
 // Runs made up for tests: ideal head, white noise, ADC, everything known.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "estimator/measurement.h"
 
@@ -12,6 +15,8 @@ namespace plumbline {
 struct SyntheticOptions {
   double sigma_V = 3e-4;  ///< of one sample
   std::size_t samples_per_pose = 20;
+  bool varied_dwells = false;  ///< every second pose has half as many
+  bool random_order = false;
   int delta_step_deg = 30;
   int h_step_deg = 20;
   double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
@@ -63,16 +68,20 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
     }
   };
   for (int i = 0; i < 6000; ++i) add_sample(result.still, i / kRate_hz, 0, 0);
+  std::vector<std::pair<int, int>> positions;
+  for (int h = 0; h <= 80; h += options.h_step_deg)
+    for (int delta = 0; delta < 360; delta += options.delta_step_deg)
+      positions.emplace_back(delta, h);
+  if (options.random_order) std::shuffle(positions.begin(), positions.end(), random);
   double t_s = 61;
-  for (int h = 0; h <= 80; h += options.h_step_deg) {
-    for (int delta = 0; delta < 360; delta += options.delta_step_deg) {
-      result.run.poses.push_back({std::ssize(result.run.poses), static_cast<double>(delta),
-                                  static_cast<double>(h), result.run.samples.size(),
-                                  options.samples_per_pose});
-      for (std::size_t i = 0; i < options.samples_per_pose; ++i)
-        add_sample(result.run.samples, t_s + static_cast<double>(i) / kRate_hz, delta, h);
-      t_s += 3;
-    }
+  for (const auto& [delta, h] : positions) {
+    const std::size_t half = options.varied_dwells ? 1 + result.run.poses.size() % 2 : 1;
+    const std::size_t count = options.samples_per_pose / half;
+    result.run.poses.push_back({std::ssize(result.run.poses), static_cast<double>(delta),
+                                static_cast<double>(h), result.run.samples.size(), count});
+    for (std::size_t i = 0; i < count; ++i)
+      add_sample(result.run.samples, t_s + static_cast<double>(i) / kRate_hz, delta, h);
+    t_s += 3;
   }
   return result;
 }

@@ -22,8 +22,11 @@ DrawParameters direction(const char* first, const char* second) {
 }
 
 Parameters cross_product(const DrawContext& at) {
-  static constexpr const char* kProduct[] = {"k_xy", "k_xz", "k_yz"};
-  return {{kProduct[at.random.index(3)], at.random.sign()}};
+  Parameters p;  // one product, two or all three
+  const auto products = 1 + at.random.index(7);
+  for (const auto& [bit, name] : {std::pair(1U, "k_xy"), {2U, "k_xz"}, {4U, "k_yz"}})
+    if ((products & bit) != 0) p[name] = at.random.sign() * at.random.uniform(0.3, 1);
+  return p;
 }
 Parameters warmup(const DrawContext& at) {
   return {{"b", at.random.sign()}, {"tau", at.run_s * at.random.uniform(0.05, 0.3)}};
