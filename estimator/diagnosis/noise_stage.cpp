@@ -40,8 +40,8 @@ PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
       const Eigen::ArrayXd off =
           (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).array().abs();
       // Short dwells do not resolve the finest contrasts: theirs are zero.
-      const auto count = static_cast<double>(std::count_if(
-          input.log.visits.begin(), input.log.visits.end(), [&](const Visit& visit) {
+      const auto count = static_cast<double>(
+          std::count_if(input.log.visits.begin(), input.log.visits.end(), [&](const Visit& visit) {
             return input.log.contrasts.at(visit.count).col(d).squaredNorm() > 0;
           }));
       if (count == 0) {

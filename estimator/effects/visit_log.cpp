@@ -199,6 +199,18 @@ bool VisitLog::is_coarse() const {
   return false;
 }
 
+namespace {
+
+/// Only even codes: rounding to twice the step, or the lowest bit held at 0. The readings are the
+/// same, and one axis may have either; three bits that are all held at 0 are one converter that has
+/// a bit less than declared.
+bool rounds_or_lacks_the_lowest_bit(const CodeFaults& codes) {
+  return codes.coarser_lattice && codes.stuck_bits.size() == 1 &&
+         codes.stuck_bits.front().bit == 0 && !codes.stuck_bits.front().value;
+}
+
+}  // namespace
+
 VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {
   const SampleTable& samples = set.samples;
   VisitLog log;
@@ -230,12 +242,14 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.visits.push_back(std::move(visit));
     log.visits.back().delta_direction = direction_of_arrival(log, log.visits.size() - 1);
   }
+  if (log.adc) {
+    parallel_for(kAxisCount, [&](std::size_t i) { log.codes[i] = code_faults(set, i, *log.adc); });
+    if (std::all_of(log.codes.begin(), log.codes.end(), rounds_or_lacks_the_lowest_bit))
+      for (CodeFaults& codes : log.codes) codes.stuck_bits.clear();
+  }
   parallel_for(kAxisCount, [&](std::size_t i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
-    if (log.adc) {
-      log.codes[i] = code_faults(set, i, *log.adc);
-      log.input_sd_V[i] = input_scatter_V(set, log, i);
-    }
+    if (log.adc) log.input_sd_V[i] = input_scatter_V(set, log, i);
     log.smallest_step_V[i] = smallest_step(samples.u_V[i]);
     const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
     log.lowest_V[i] = *low;
