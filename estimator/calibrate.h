@@ -53,7 +53,8 @@ struct EffectParameter {
   double u = 0;
   std::string unit;
   std::optional<FilterEstimate> filter = {};
-  bool estimated = false;  ///< by the fit, and not chosen among instants, bits or poses
+  bool estimated = false;   ///< by the fit, and not chosen among instants, bits or poses
+  bool unrecorded = false;  ///< ParameterInfo's
 };
 
 /// How large an effect that was not found would have had to be: its amplitude at 5 standard

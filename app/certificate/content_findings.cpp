@@ -53,7 +53,7 @@ void add_effect_table(const Composer& c) {
   const auto parameters_text = [](const std::vector<EffectParameter>& parameters) {
     std::string text;
     for (const EffectParameter& p : parameters)
-      text += (text.empty() ? "" : "; ") + parameter_text(p);
+      if (!p.unrecorded) text += (text.empty() ? "" : "; ") + parameter_text(p);
     return text;
   };
   for (const FoundEffect& effect : diagnosis.effects) {

@@ -46,6 +46,7 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
     // An amplitude that this hypothesis leaves out is no result.
     if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
     EffectParameter parameter{infos[k].name, std::nullopt, values[k], 0, infos[k].unit};
+    parameter.unrecorded = infos[k].unrecorded;
     if (active.free[k]) {
       parameter.estimated = true;
       parameter.u = std::sqrt(std::max(estimate.covariance(row, row), 0.0));
@@ -106,6 +107,7 @@ std::string describe(const FoundEffect& effect) {
   text += "): ";
   for (std::size_t k = 0; k < effect.parameters.size(); ++k) {
     const EffectParameter& p = effect.parameters[k];
+    if (p.unrecorded) continue;
     text += (k == 0 ? "" : ", ") + p.name + " = " + number(p.value, "%.4g");
     if (p.u > 0) text += " ± " + number(p.u, "%.2g");
     if (!p.unit.empty()) text += " " + p.unit;

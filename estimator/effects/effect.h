@@ -29,6 +29,8 @@ struct ParameterInfo {
   ParameterRole role = ParameterRole::amplitude;
   double step = 0;     ///< over which the response is differentiated; 0: fitted to role and value
   bool place = false;  ///< shape: a place, which may be zero or negative, and not a size
+  /// How something went that nothing recorded says: a program needs it, a reader does not.
+  bool unrecorded = false;
 };
 
 /// Where the search begins: shapes and indices at given values, amplitudes at a small typical size

@@ -24,8 +24,8 @@ class Backlash final : public Effect {
     // its first angle: 0 with no play, 1 from δ = 0, 2 as in the first turn. Nothing recorded says
     // so, but of a rig that ran the plan itself the way is known.
     return {{"w", "deg", ParameterRole::amplitude},
-            {"way", "", ParameterRole::index},
-            {"start", "", ParameterRole::index}};
+            {.name = "way", .unit = "", .role = ParameterRole::index, .unrecorded = true},
+            {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     // Approached from one side only, backlash is a zero of the spindle.

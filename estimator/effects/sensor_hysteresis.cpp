@@ -19,8 +19,8 @@ class Hysteresis final : public Effect {
   bool remembers() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"w", "g", ParameterRole::amplitude},
-            {"start", "", ParameterRole::index},
-            {"ties", "", ParameterRole::index}};
+            {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true},
+            {.name = "ties", .unit = "", .role = ParameterRole::index, .unrecorded = true}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> found;
