@@ -322,19 +322,21 @@ class Bend final : public FunctionOfDriver {
 
 class Step final : public FunctionOfDriver {
  public:
-  using FunctionOfDriver::FunctionOfDriver;
+  Step(DriverPointer driver, Target target, StepEdge edge)
+      : FunctionOfDriver(std::move(driver), target), edge_(edge) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    // A width is not differentiated: hardly a reading lies in the edge of a sharp step.
-    return {place("at"),
-            {"width", "", ParameterRole::index},
-            {"p", target().unit(), ParameterRole::amplitude}};
+    // Hardly a reading lies in the edge of a sharp step: its width is not differentiated.
+    const auto width = edge_ == StepEdge::sharp ? ParameterRole::index : ParameterRole::shape;
+    return {place("at"), {"width", "", width}, {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     constexpr int kParts = 12;
     const auto [low, high] = range();
+    const std::vector<double> shares =
+        edge_ == StepEdge::sharp ? std::vector{0.01} : std::vector{0.04, 0.13};
     std::vector<Hypothesis> starts;
-    for (const double share : {0.01, 0.04, 0.13})
+    for (const double share : shares)
       for (int k = 1; k < kParts; ++k)
         starts.push_back(
             {{low + (high - low) * k / kParts, share * (high - low), target().typical_size()}});
@@ -343,6 +345,7 @@ class Step final : public FunctionOfDriver {
   std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
                                  const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
+    if (edge_ == StepEdge::gradual) return others;
     for (const double ratio : {0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0})
       others.push_back({{found.p[0], ratio * found.p[1], found.p[2]}});
     // Between two readings nothing moves a sharp step: it is tried at every place.
@@ -354,10 +357,14 @@ class Step final : public FunctionOfDriver {
   }
 
  private:
-  std::string function() const override { return "step"; }
+  std::string function() const override {
+    return edge_ == StepEdge::sharp ? "step" : "gradual step";
+  }
   double at(double value, const double* p) const override {
     return p[2] / (1 + std::exp((p[0] - value) / p[1]));
   }
+
+  StepEdge edge_;
 };
 
 class Decay final : public FunctionOfDriver {
@@ -378,6 +385,58 @@ class Decay final : public FunctionOfDriver {
  private:
   std::string function() const override { return "exponential"; }
   double at(double t_s, const double* p) const override { return p[1] * std::exp(-t_s / p[0]); }
+};
+
+/// What diffuses grows with the root of the time; other powers come out of the fit.
+class Power final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"start", "", ParameterRole::index},
+            {"end", "", ParameterRole::index},
+            {"power", "", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double power : {0.5, 2.0})
+      starts.push_back({{low, high, power, target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "power"; }
+  double at(double value, const double* p) const override {
+    const double share = (value - p[0]) / (p[1] - p[0]);
+    return share > 0 && p[2] > 0 ? p[3] * std::pow(share, p[2]) : 0;
+  }
+};
+
+/// What relaxes over many time constants alike, as most ageing does.
+class Logarithm final : public FunctionOfDriver {
+ public:
+  using FunctionOfDriver::FunctionOfDriver;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"start", "", ParameterRole::index},
+            {"tau", "", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : {0.003, 0.03, 0.3})
+      starts.push_back({{low, share * (high - low), target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "logarithm"; }
+  double at(double value, const double* p) const override {
+    return value > p[0] && p[1] > 0 ? p[2] * std::log1p((value - p[0]) / p[1]) : 0;
+  }
 };
 
 class PlayLag final : public FunctionOfDriver {
@@ -488,11 +547,17 @@ std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
   return std::make_unique<Bend>(std::move(driver), target);
 }
-std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target) {
-  return std::make_unique<Step>(std::move(driver), target);
+std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge) {
+  return std::make_unique<Step>(std::move(driver), target, edge);
 }
 std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target) {
   return std::make_unique<Decay>(std::move(clock), target);
+}
+std::unique_ptr<SmoothTerm> power(DriverPointer driver, const Target& target) {
+  return std::make_unique<Power>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> logarithm(DriverPointer driver, const Target& target) {
+  return std::make_unique<Logarithm>(std::move(driver), target);
 }
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
   return std::make_unique<PlayLag>(std::move(driver), target);

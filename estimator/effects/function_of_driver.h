@@ -49,10 +49,15 @@ std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
 /// Nothing on one side of an unknown value, proportional to the distance from it on the other.
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
-/// From nothing to all of it about an unknown value, sharply or gradually (logistic function).
-std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target);
+enum class StepEdge { sharp, gradual };
+/// From nothing to all of it about an unknown value (logistic function).
+std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge);
 /// What dies away with the time, by an unknown time constant.
 std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target);
+/// An unknown power of the distance from where the driver began.
+std::unique_ptr<SmoothTerm> power(DriverPointer driver, const Target& target);
+/// ln(1 + distance from where the driver began over an unknown one).
+std::unique_ptr<SmoothTerm> logarithm(DriverPointer driver, const Target& target);
 /// What follows the driver through a play of unknown width lags behind it by this function.
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
 

@@ -69,6 +69,10 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
       add(driver->angle ? harmonic_series(driver, target, degree)
                         : polynomial(driver, target, degree));
   };
+  const auto add_steps = [&](const DriverPointer& driver, const Target& target) {
+    for (const StepEdge edge : {StepEdge::sharp, StepEdge::gradual})
+      add(step(driver, target, edge));
+  };
   const Target bias{TermForm::bias}, scale{TermForm::scale};
   const Target of_delta{TermForm::geometry}, of_h{TermForm::geometry, &HeadGeometry::h_rad};
   const Target of_roll{TermForm::geometry, &HeadGeometry::roll_rad};
@@ -98,21 +102,30 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
     }
     if (column) {
       columns.push_back(driver);
-      add(step(driver, bias));
-      add(step(driver, scale));
+      add_steps(driver, bias);
+      add_steps(driver, scale);
       add(play(driver, bias));
       add(play(driver, scale));
     }
     if (clock) {
       add(bell(driver, bias));
       add(pulses(driver, bias));
+      for (const Target& target : {bias, scale}) {
+        add(power(driver, target));
+        add(logarithm(driver, target));
+      }
       for (const Target& target : {bias, scale, of_delta, of_h, of_roll})
         add(wave(driver, target, {1.5, 0.5, 40}));
       // For the bias both are listed effects, and a step of delta is a slipped index.
       for (const Target& target : {scale, of_h, of_roll}) {
-        add(step(driver, target));
+        add_steps(driver, target);
         add(decay(driver, target));
       }
+    }
+    if (driver->in_the_twelve) {
+      add(bend(driver, bias));
+      add(bend(driver, scale));
+      add_steps(driver, bias);
     }
     if (driver->angle) {
       for (const Target& target : {bias, of_delta, of_h}) add(bell(driver, target));
@@ -143,8 +156,9 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const auto driver = std::make_shared<const Driver>(code_driver(log, axis));
     if (!any && !driver->varies()) continue;
-    add(wave(driver, bias, {3, 0.5, 40}, log.adc ? kShortestWave * log.adc->lsb_V() : 0));
+    add(wave(driver, bias, {1.5, 0.5, 40}, log.adc ? kShortestWave * log.adc->lsb_V() : 0));
     add(bend(driver, bias));
+    add_steps(driver, bias);
   }
   for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
     for (const int degree : {1, 2, 3}) add(dwell_course(log, of, degree));
