@@ -13,18 +13,21 @@ namespace plumbline {
 namespace {
 
 // What is forgotten sooner is settling after a move; what lasts longer than a run is a drift.
-constexpr double kLeast_s = 30, kMost_s = 4800;
-constexpr int kTimeConstants = 6;  // that a search starts from
+constexpr double kLeast_s = 4, kMost_s = 4800;
+constexpr int kTimeConstants = 8;  // that a search starts from
 constexpr int kParts = 8;          // into which the table divides the way between two of them
 
 std::vector<double> time_constants_s() {
   return effect::geometric(kLeast_s, kMost_s, (kTimeConstants - 1) * kParts + 1);
 }
 
-/// The average of the past at every visit, which began at the first one as it was there. Between
-/// two visits a value `changes_evenly`, or stays until the next.
+/// How a value goes from one visit to the next: evenly, whatever the head does in between, or it
+/// stays until the next, and at a rest has long been what it is there.
+enum class InBetween { evenly, with_the_head };
+
+/// The average of the past at every visit, which began at the first one as it was there.
 std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<double>& value,
-                                        bool changes_evenly, double tau_s) {
+                                        InBetween between, double tau_s) {
   std::vector<double> average(value.size());
   double state = value.empty() ? 0 : value.front();  // at the end of a visit
   double end_s = 0;
@@ -34,8 +37,9 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
     if (k > 0) {
       const double kept = std::exp(-(visit.t_arrival_s - end_s) / tau_s);
       const double meanwhile =
-          changes_evenly ? std::midpoint(value[k - 1], value[k]) : value[k - 1];
+          between == InBetween::evenly ? std::midpoint(value[k - 1], value[k]) : value[k - 1];
       state = meanwhile + kept * (state - meanwhile);
+      if (between == InBetween::with_the_head && log.is_rest(k)) state = value[k];
     }
     average[k] =
         value[k] + (state - value[k]) * effect::mean_decay(visit, visit.t_arrival_s, tau_s);
@@ -87,11 +91,11 @@ class Memory {
   /// A column is the same for all axes, an attitude is each axis's own.
   std::size_t sources() const { return driver_->recorded ? 1 : kAxisCount; }
   void make_table() const {
+    const InBetween between = driver_->recorded ? InBetween::evenly : InBetween::with_the_head;
     for (const double tau_s : time_constants_s()) {
       auto& averages = table_.emplace_back();
       for (std::size_t source = 0; source < sources(); ++source)
-        averages.push_back(
-            average_of_the_past(log_, driver_->value[source], driver_->recorded, tau_s));
+        averages.push_back(average_of_the_past(log_, driver_->value[source], between, tau_s));
     }
   }
 

@@ -157,6 +157,7 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
     const auto driver = std::make_shared<const Driver>(code_driver(log, axis));
     if (!any && !driver->varies()) continue;
     add(wave(driver, bias, {1.5, 0.5, 40}, log.adc ? kShortestWave * log.adc->lsb_V() : 0));
+    add_polynomials(driver, bias, {2, 3, 5});
     add(bend(driver, bias));
     add_steps(driver, bias);
   }

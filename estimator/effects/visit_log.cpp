@@ -182,6 +182,7 @@ void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log) {
   log.visits.insert(log.visits.begin(), all.begin(), all.end());
   log.earlier = all.size();
   log.moved_since = head == BetweenSets::anywhere;
+  log.homed_since = head == BetweenSets::home;
   set_directions(log);
 }
 

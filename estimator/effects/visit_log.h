@@ -53,14 +53,20 @@ struct VisitLog {
   /// zero. The first are step_contrasts(); then come sine and cosine of every line.
   std::map<std::size_t, Eigen::MatrixXd> contrasts;
 
-  /// Visits in front that belong to an earlier set, and whether the head stood elsewhere since.
+  /// Visits in front that belong to an earlier set, whether the head stood elsewhere since, and
+  /// whether the last of them is its rest at home.
   std::size_t earlier = 0;
   bool moved_since = false;
+  bool homed_since = false;
 
   /// Where the head came from; null where nothing recorded says so.
   const Visit* before(std::size_t visit) const {
     const bool unknown = visit == 0 || (visit == earlier && moved_since);
     return unknown ? nullptr : &visits[visit - 1];
+  }
+  /// Whether the head is taken to have been there for long: nothing says that it was not.
+  bool is_rest(std::size_t visit) const {
+    return before(visit) == nullptr || (homed_since && visit + 1 == earlier);
   }
   /// How many numbers describe the course of a dwell beside its mean.
   Eigen::Index dwell_contrasts() const { return contrasts.begin()->second.cols(); }
