@@ -126,7 +126,10 @@ class Search {
       const double log_p =
           model_.log_p_of(s.candidate, model_.stage().fit, with, gains.dof(s.candidate));
       const double score = log_p + (s.score - s.log_p);
-      if (score < winner_score) {
+      // Of two that say the same of these readings, the first of the list: the simpler.
+      constexpr double kSame = 1e-3;
+      const double ahead = winner_score - score;
+      if (ahead > kSame || (ahead > -kSame && s.candidate < winner->candidate)) {
         winner = &s;
         with_winner = with.parameters;
         winner_score = score;

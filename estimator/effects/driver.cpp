@@ -38,6 +38,19 @@ std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& v
   return rate;
 }
 
+/// Sign of the last change of h, upwards before the first one.
+std::vector<double> direction_of_h(const VisitLog& log) {
+  constexpr double kMoved_rad = 1e-9;
+  std::vector<double> direction(log.visits.size(), 1);
+  for (std::size_t k = 0; k < direction.size(); ++k) {
+    const Visit* before = log.before(k);
+    if (before == nullptr) continue;
+    const double change_rad = log.visits[k].h_rad - before->h_rad;
+    direction[k] = std::abs(change_rad) < kMoved_rad ? direction[k - 1] : change_rad > 0 ? 1 : -1;
+  }
+  return direction;
+}
+
 struct Column {
   std::string name;
   std::vector<double> value;
@@ -84,6 +97,20 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   }
   // Nothing after a long rest, so that the 12 parameters are those of rest.
   drivers.push_back({"previous_pose", "change of a_i since", change_g});
+  // What only a direction decides is the simpler where an order of visits tells no more.
+  for (const std::size_t way : {0, 1}) {
+    Driver& direction = add("previous_pose", [&, way](std::size_t k) {
+      const int sign = visits[k].delta_direction[way];
+      return sign == 0 ? 1.0 : sign;
+    });
+    direction.past = way == 0 ? "direction of the last turn of delta"
+                              : "direction of the last turn of delta within 360 degrees";
+    direction.two_valued = true;
+  }
+  const std::vector<double> h_direction = direction_of_h(log);
+  Driver& tilted = add("previous_pose", [&](std::size_t k) { return h_direction[k]; });
+  tilted.past = "direction of the last turn of h";
+  tilted.two_valued = true;
   add("previous_pose", [&](std::size_t k) {
     const Visit* before = log.before(k);
     return before ? std::remainder(visits[k].delta_rad - before->delta_rad, 2 * std::numbers::pi)

@@ -18,6 +18,7 @@ struct Driver {
   PerAxis<std::vector<double>> value;  ///< per axis and visit
   bool angle = false;                  ///< periodic in 2π
   bool recorded = false;               ///< a column of the measurement file, or its rate
+  bool two_valued = false;             ///< any function of it is a straight line
   bool in_the_twelve = false;          ///< a bias proportional to it is what K and U₀ describe
   /// Where the values can lie; without it, where they do.
   std::optional<std::pair<double, double>> span = {};

@@ -82,6 +82,10 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
     const auto driver = std::make_shared<const Driver>(std::move(each));
     if (!any && !driver->varies()) continue;  // a variable that never varied drives nothing
     const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
+    if (driver->two_valued) {
+      for (const Target& target : {bias, scale, of_h}) add_polynomials(driver, target, {1});
+      continue;
+    }
     for (const Target& target : {bias, scale, of_delta, of_h}) {
       // A bias or scale that follows the time or a column in a straight line is a listed effect.
       const bool listed = (clock || column) && target.form != TermForm::geometry;
@@ -95,6 +99,7 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
         for (std::size_t second = other; second < kAxisCount; ++second)
           add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add_polynomials(driver, of_roll, {1, 2, 3});
+      add_polynomials(driver, of_skew, {1, 2});
     }
     if (clock || column) {
       add(bend(driver, bias));
@@ -123,11 +128,19 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
       }
     }
     if (driver->in_the_twelve) {
+      // Products of third order.
+      for (std::size_t other = 1; other < kAxisCount; ++other)
+        add_polynomials(driver, {.form = TermForm::scale, .other = other}, {2});
+      for (std::size_t other = 0; other < kAxisCount; ++other)
+        for (std::size_t second = other + 1; second < kAxisCount; ++second)
+          add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add(bend(driver, bias));
       add(bend(driver, scale));
       add_steps(driver, bias);
     }
     if (driver->angle) {
+      for (std::size_t other = 1; other < kAxisCount; ++other)
+        add_polynomials(driver, {.form = TermForm::scale, .other = other}, {2, 3});
       for (const Target& target : {bias, of_delta, of_h}) add(bell(driver, target));
       for (const Target& target : {of_roll, of_skew}) add_polynomials(driver, target, {1, 2});
     }
