@@ -474,9 +474,11 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
   restored.owned.insert(restored.owned.end(), terms.begin(), terms.end());
   for (const UnlistedStructure& found : model.unlisted) {
     const std::size_t before = parameters.effects.size();
-    for (const auto& term : terms)
-      if (term->is(found.driver, found.form, found.shape))
-        restore(*term, found.axes, found.parameters, parameters);
+    // Terms of one shape differ in how they are searched for, not in what they say.
+    const auto term = std::find_if(terms.begin(), terms.end(), [&](const auto& each) {
+      return each->is(found.driver, found.form, found.shape);
+    });
+    if (term != terms.end()) restore(**term, found.axes, found.parameters, parameters);
     if (parameters.effects.size() == before)
       restored.left_out.push_back("unlisted: " + found.driver);
   }

@@ -47,7 +47,7 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
     tried = candidate.effect;
     CandidateList ones;
     for (const Hypothesis& hypothesis :
-         tried->in_one(model.input().log, candidate.axis, repeated.effect->id(), p))
+         tried->in_one(model.input().log, candidate.axis, *repeated.effect, p))
       ones.candidates.push_back(
           {.effect = tried, .axis = candidate.axis, .hypothesis = hypothesis});
     if (ones.candidates.empty()) continue;
@@ -73,12 +73,15 @@ bool is_step(const Candidate& candidate) { return candidate.effect->id() == "sen
 /// What the model holds of an axis that steps: steps one by one, and trains of them.
 std::vector<std::size_t> of_regular_steps(const SearchModel& model, std::size_t axis) {
   const std::vector<std::vector<double>> any_train = {{1, 0}, {1, 1}, {-1, 0.5}};
+  const auto& candidates = model.list().candidates;
+  const auto step = std::find_if(candidates.begin(), candidates.end(), is_step);
+  if (step == candidates.end()) return {};
   std::vector<std::size_t> found;
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& chosen = model.candidate(k);
     if (chosen.axis == axis &&
         (is_step(chosen) ||
-         !chosen.effect->in_one(model.input().log, axis, "sensor.bias_step", any_train).empty()))
+         !chosen.effect->in_one(model.input().log, axis, *step->effect, any_train).empty()))
       found.push_back(k);
   }
   return found;
@@ -123,12 +126,13 @@ void tell_in_one(SearchModel& model) {
     }
     std::vector<std::size_t> instances;
     std::vector<std::vector<double>> p;
-    for (std::size_t l = k; l < model.size(); ++l) {
+    for (std::size_t l = 0; l < model.size(); ++l) {
       const Candidate& other = model.candidate(l);
       if (other.effect != first.effect || other.axis != first.axis) continue;
       instances.push_back(l);
       p.push_back(model.stage().fit.parameters.effects[l].p);
     }
+    if (instances.front() < k) continue;  // looked at with the first of them
     if (replace_in_one(model, instances, first, p, model.looks(), model.options().false_alarm))
       return;
   }

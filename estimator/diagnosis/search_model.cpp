@@ -182,7 +182,7 @@ void SearchModel::forget(std::size_t effect) {
 }
 
 /// Puts one of those close to the newcomer in its place that explains clearly more.
-bool SearchModel::look_closer() {
+void SearchModel::look_closer() {
   constexpr double kClearly = 10;
   const ActiveEffect& newcomer = stage_.fit.parameters.effects.back();
   const std::vector<Hypothesis> closer =
@@ -214,7 +214,7 @@ bool SearchModel::look_closer() {
     if (with.determined && with.chi2 < stage_.fit.chi2 - kClearly &&
         (best == nullptr || with.chi2 < best->chi2))
       best = &with;
-  return best != nullptr && adopt(best->parameters);
+  if (best != nullptr) adopt(best->parameters);
 }
 
 /// Leaves open what nothing recorded decides where that is clearly the likelier.
@@ -251,9 +251,7 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects,
     chosen_.push_back(newcomer.candidate);
     p_values_.push_back(newcomer.p);
   }
-  constexpr int kMostLooks = 4;
-  for (int k = 0; k < kMostLooks && look_closer(); ++k) {
-  }
+  look_closer();
   leave_ties_open();
   return true;
 }

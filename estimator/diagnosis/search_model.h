@@ -85,7 +85,7 @@ class SearchModel {
 
  private:
   bool adopt(const EnlargedParameters& parameters);
-  bool look_closer();
+  void look_closer();
   void leave_ties_open();
   void forget(std::size_t effect);
   /// Of its free parameters, at least one.

@@ -78,12 +78,11 @@ class Quantization final : public Effect {
     return part > 0 ? finer_steps(log, axis, log.adc->lsb_V() / part, 0)
                     : std::vector<Hypothesis>{};
   }
-  std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const std::string& repeated,
+  std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const Effect& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
-    constexpr std::size_t kWave = 4;  // parameters; another shape in the codes is something else
-    if (!repeated.starts_with("unlisted:code_") || instances.size() != 1 ||
-        instances.front().size() != kWave || !shows_finer_step(log, axis))
-      return {};
+    if (!repeated.id().starts_with("unlisted:code_") || instances.size() != 1 ||
+        !shows_finer_step(log, axis) || repeated.parameters()[1].name != "period")
+      return {};  // another shape in the codes is something else
     return finer_steps(log, axis, instances.front()[1], kNearby);
   }
   double term_g(const TermInput& input, const double* p) const override {

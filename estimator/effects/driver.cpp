@@ -98,7 +98,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   // Nothing after a long rest, so that the 12 parameters are those of rest.
   drivers.push_back({"previous_pose", "change of a_i since", change_g});
   // What only a direction decides is the simpler where an order of visits tells no more.
-  for (const std::size_t way : {0, 1}) {
+  for (const std::size_t way : {std::size_t{0}, std::size_t{1}}) {
     Driver& direction = add("previous_pose", [&, way](std::size_t k) {
       const int sign = visits[k].delta_direction[way];
       return sign == 0 ? 1.0 : sign;

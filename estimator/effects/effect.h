@@ -83,7 +83,7 @@ class Effect {
   /// Hypotheses that say in one what several `instances` of the effect `repeated` on the same axis
   /// say one by one, or what one of them hints at; none where they have nothing in common.
   virtual std::vector<Hypothesis> in_one(const VisitLog&, std::size_t /*axis*/,
-                                         const std::string& /*repeated*/,
+                                         const Effect& /*repeated*/,
                                          const std::vector<std::vector<double>>& /*p*/) const {
     return {};
   }

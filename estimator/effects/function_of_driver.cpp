@@ -92,6 +92,7 @@ class Polynomial final : public FunctionOfDriver {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     std::vector<double> p(parameters().size(), target().typical_size());
     std::tie(p[0], p[1]) = range();
+    if (!(p[1] > p[0])) return {};
     if (is_in_the_twelve()) {
       if (degree_ == 1) return {};
       p[2] = 0;
@@ -241,11 +242,11 @@ class Pulses final : public FunctionOfDriver {
     }
     return starts;
   }
-  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const std::string& repeated,
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
     if (target().form != TermForm::bias) return {};
-    if (repeated == "sensor.bias_step") return from_steps(instances);
-    return repeated == id() ? from_waves(instances) : std::vector<Hypothesis>{};
+    if (repeated.id() == "sensor.bias_step") return from_steps(instances);
+    return repeated.id() == id() ? from_waves(instances) : std::vector<Hypothesis>{};
   }
 
  private:
@@ -357,9 +358,7 @@ class Step final : public FunctionOfDriver {
   }
 
  private:
-  std::string function() const override {
-    return edge_ == StepEdge::sharp ? "step" : "gradual step";
-  }
+  std::string function() const override { return "step"; }
   double at(double value, const double* p) const override {
     return p[2] / (1 + std::exp((p[0] - value) / p[1]));
   }

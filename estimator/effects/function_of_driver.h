@@ -49,6 +49,7 @@ std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
 /// Nothing on one side of an unknown value, proportional to the distance from it on the other.
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
+/// How a step is searched for; once found, both say the same.
 enum class StepEdge { sharp, gradual };
 /// From nothing to all of it about an unknown value (logistic function).
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <set>
@@ -418,6 +419,29 @@ TEST(AverageOfThePast, OfTheAttitudeIsNothingAfterALongRest) {
     EXPECT_GT(change.head(30).cwiseAbs().maxCoeff(), 0);
   }
   EXPECT_EQ(seen, 2);  // bias and scale
+}
+
+// A model that is read again takes the first term of that driver, form and shape.
+TEST(SmoothTerms, OfOneDriverFormAndShapeSayTheSame) {
+  const VisitLog log = example_log();
+  const auto terms = smooth_terms(log, SmoothTermSelection::any);
+  std::map<std::vector<std::string>, const SmoothTerm*> first;
+  int again = 0;
+  for (const auto& term : terms) {
+    const auto [known, fresh] =
+        first.try_emplace({term->driver(), to_string(term->form()), term->shape()}, term.get());
+    if (fresh) continue;
+    ++again;
+    EXPECT_TRUE(term->is(known->first[0], known->first[1], known->first[2]));
+    for (const Hypothesis& hypothesis : term->hypotheses(log, 0)) {
+      EnlargedParameters with = twelve();
+      with.effects = {activate(*term, 0, hypothesis)};
+      const Eigen::VectorXd said_V = predict_means_V(log, with)[0];
+      with.effects[0].effect = known->second;
+      ASSERT_EQ(said_V, predict_means_V(log, with)[0]) << term->driver() << ' ' << term->shape();
+    }
+  }
+  EXPECT_GT(again, 0);
 }
 
 TEST(LegendreSeries, GoesStraightOnBeyondTheRange) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -20,8 +21,8 @@ struct SyntheticOptions {
   int delta_step_deg = 30;
   int h_step_deg = 20;
   double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
-  /// Anything else that x does, V, of its specific force in g and the time in s.
-  std::function<double(double, double)> more_x_V = {};
+  /// Anything else that x does, V, of the specific force in g and the time in s.
+  std::function<double(const std::array<double, 3>&, double)> more_x_V = {};
   std::function<double(double)> base_roll_rad = {};  ///< at a time in s
 };
 
@@ -61,7 +62,7 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
       const auto& row = result.truth[axis];
       double u_V = row[0] * a[0] + row[1] * a[1] + row[2] * a[2] + row[3];
       if (axis == 0) u_V += options.k2_x_V_per_g2 * a[0] * a[0];
-      if (axis == 0 && options.more_x_V) u_V += options.more_x_V(a[0], t_s);
+      if (axis == 0 && options.more_x_V) u_V += options.more_x_V(a, t_s);
       u_V += options.sigma_V * normal(random);
       table.u_V[axis].push_back(adc.min_V +
                                 adc.lsb_V() * std::round((u_V - adc.min_V) / adc.lsb_V()));

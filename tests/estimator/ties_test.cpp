@@ -30,7 +30,9 @@ SyntheticRun with_hysteresis(AtTie at_tie) {
   options.delta_step_deg = 10;
   options.h_step_deg = 10;
   options.random_order = true;
-  options.more_x_V = [=, last_g = 0.0, last_s = -10.0, sign = 1.0](double a_g, double t_s) mutable {
+  options.more_x_V = [=, last_g = 0.0, last_s = -10.0, sign = 1.0](const auto& all_g,
+                                                                   double t_s) mutable {
+    const double a_g = all_g[0];
     constexpr double kSame_g = 1e-9, kBetweenPoses_s = 1;
     if (t_s > last_s + kBetweenPoses_s)
       sign = std::abs(a_g - last_g) < kSame_g ? at_tie(sign) : (a_g > last_g ? 1 : -1);

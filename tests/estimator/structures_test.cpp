@@ -1,0 +1,101 @@
+// What has no name is told by its driver, what it acts on, and its shape.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "estimator/calibrate.h"
+#include "tests/estimator/synthetic_run.h"
+
+namespace plumbline {
+namespace {
+
+using testing::IsEmpty;
+
+struct Structure {
+  const char* driver;
+  const char* form;
+  const char* shape;
+};
+
+void expect_only_structure(const SyntheticOptions& options, const Structure& expected) {
+  const SyntheticRun data = synthetic_run(7, {16, -5.0, 0.0}, options);
+  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, expected.driver);
+  EXPECT_EQ(found.form, expected.form);
+  EXPECT_EQ(found.shape, expected.shape);
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    EXPECT_LT(result.after.heldout_pose_rms_mps2[i], 1.3 * result.floor_pose_rms_mps2[i]);
+}
+
+TEST(Structure, AnAxisThatWasStruckHasAnotherScaleFromThenOn) {
+  SyntheticOptions options;
+  options.more_x_V = [](const auto& a_g, double t_s) { return t_s < 150 ? 0 : 1e-3 * a_g[0]; };
+  expect_only_structure(options, {"t_s", "scale", "step"});
+}
+
+TEST(Structure, AScaleThatWarmsUpDiesAway) {
+  SyntheticOptions options;
+  options.more_x_V = [](const auto& a_g, double t_s) {
+    return 6e-2 * std::exp(-t_s / 25) * a_g[0];
+  };
+  expect_only_structure(options, {"t_s", "scale", "exponential"});
+}
+
+TEST(Structure, ABaseThatWasPushedStandsCrookedFromThenOn) {
+  SyntheticOptions options;
+  options.base_roll_rad = [](double t_s) { return t_s < 150 ? 0 : 0.02; };
+  expect_only_structure(options, {"t_s", "geometry", "step, added to the base roll"});
+}
+
+// As a warm-up and a polynomial it ended with the run.
+TEST(Structure, WhatDiffusesGrowsWithTheRootOfTheTime) {
+  SyntheticOptions options;
+  options.more_x_V = [](const auto&, double t_s) {
+    return t_s < 61 ? 0 : 5e-4 * std::sqrt(t_s - 61);
+  };
+  expect_only_structure(options, {"t_s", "bias", "power"});
+}
+
+// As a cubic it left remnants that other effects were named for.
+TEST(Structure, AnEndThatIsReachedGraduallyIsAWideStep) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) { return 1e-3 * std::tanh(a_g[0] / 0.15); };
+  expect_only_structure(options, {"a_x", "bias", "step"});
+}
+
+TEST(Structure, ProductsOfThreeComponentsAreNotDrivenByTheTime) {
+  SyntheticOptions options;
+  options.more_x_V = [](const auto& a_g, double) { return 3e-3 * a_g[0] * a_g[1] * a_g[2]; };
+  expect_only_structure(options,
+                        {"a_x", "scale",
+                         "polynomial of degree 1, times the component of the next axis and "
+                         "the component of the axis after the next"});
+}
+
+// The way of the last turn, kept while only h moves.
+TEST(Structure, WhatDependsOnTheDirectionOfTheTurnIsNoPolynomialOfIt) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 20;
+  options.more_x_V = [last_rad = 0.0, way = 1.0](const auto& a_g, double) mutable {
+    constexpr double kMoved_rad = 1e-6;
+    const double to_rad = std::atan2(-a_g[1], a_g[0]);
+    const double delta_rad = to_rad < -kMoved_rad ? to_rad + 2 * std::acos(-1.0) : to_rad;
+    if (std::abs(delta_rad - last_rad) > kMoved_rad) way = delta_rad > last_rad ? 1 : -1;
+    last_rad = delta_rad;
+    return 3e-4 * way;
+  };
+  expect_only_structure(
+      options,
+      {"previous_pose", "bias",
+       "polynomial of degree 1 in the direction of the last turn of delta within 360 degrees"});
+}
+
+}  // namespace
+}  // namespace plumbline
