@@ -56,130 +56,157 @@ Driver angle_without_return(const VisitLog& log) {
   return driver;
 }
 
+const Target kBias{TermForm::bias}, kScale{TermForm::scale};
+const Target kDelta{TermForm::geometry}, kH{TermForm::geometry, &HeadGeometry::h_rad};
+const Target kRoll{TermForm::geometry, &HeadGeometry::roll_rad};
+const Target kSkew{TermForm::geometry, &HeadGeometry::skew_rad};
+
+/// The terms of a log, gathered driver by driver.
+class TermList {
+ public:
+  TermList(const VisitLog& log, SmoothTermSelection selection)
+      : log_(log), any_(selection == SmoothTermSelection::any) {}
+
+  void add_all() {
+    for (Driver& each : instantaneous_drivers(log_)) {
+      const auto driver = std::make_shared<const Driver>(std::move(each));
+      // A variable that never varied drives nothing.
+      if (any_ || driver->varies()) add_of(driver);
+    }
+    add_of_wound_up_spindle();
+    const auto attitude = std::make_shared<const Driver>(load(log_));
+    if (any_ || attitude->varies()) add(play(attitude, kBias));
+    const double longest_s =
+        any_ ? std::numeric_limits<double>::infinity() : log_.last_s() - log_.first_s();
+    for (auto& term : memory_terms(log_, longest_s, attitude, columns_)) add(std::move(term));
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      const auto code = std::make_shared<const Driver>(code_driver(log_, axis));
+      if (any_ || code->varies()) add_of_code(code);
+    }
+    for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
+      for (const int degree : {1, 2, 3}) add(dwell_course(log_, of, degree));
+    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
+      for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
+        add(head_decay(angle, of));
+  }
+  std::vector<std::unique_ptr<SmoothTerm>> take() { return std::move(terms_); }
+
+ private:
+  void add(std::unique_ptr<SmoothTerm> term) { terms_.push_back(std::move(term)); }
+  void add_polynomials(const DriverPointer& driver, const Target& target,
+                       std::initializer_list<int> degrees) {
+    for (const int degree : degrees)
+      add(driver->angle ? harmonic_series(driver, target, degree)
+                        : polynomial(driver, target, degree));
+  }
+  /// Times a component of another axis.
+  void add_polynomials_of_others(const DriverPointer& driver, std::initializer_list<int> degrees) {
+    for (std::size_t other = 1; other < kAxisCount; ++other)
+      add_polynomials(driver, {.form = TermForm::scale, .other = other}, degrees);
+  }
+  void add_steps(const DriverPointer& driver, const Target& target) {
+    for (const StepEdge edge : {StepEdge::sharp, StepEdge::gradual})
+      add(step(driver, target, edge));
+  }
+
+  void add_of(const DriverPointer& driver) {
+    const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
+    if (driver->two_valued) {
+      for (const Target& target : {kBias, kScale, kH}) add_polynomials(driver, target, {1});
+      return;
+    }
+    for (const Target& target : {kBias, kScale, kDelta, kH}) {
+      // A bias or scale that follows the time or a column in a straight line is a listed effect.
+      const bool listed = (clock || column) && target.form != TermForm::geometry;
+      if (any_ || !listed) add_polynomials(driver, target, {1});
+      add_polynomials(driver, target, {2, 3, 5});
+    }
+    if (driver->recorded || clock) {
+      add_polynomials_of_others(driver, {1, 2});
+      for (std::size_t other = 0; other < kAxisCount; ++other)
+        for (std::size_t second = other; second < kAxisCount; ++second)
+          add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
+      add_polynomials(driver, kRoll, {1, 2, 3});
+      add_polynomials(driver, kSkew, {1, 2});
+    }
+    if (clock || column)
+      for (const Target& target : {kBias, kScale}) add(bend(driver, target));
+    if (column) add_of_column(driver);
+    if (clock) add_of_clock(driver);
+    if (driver->in_the_twelve) add_of_component(driver);
+    if (driver->angle) add_of_angle(driver);
+    if (driver->name == "h_deg") add_harmonics_of_h(driver);
+  }
+  void add_of_column(const DriverPointer& driver) {
+    columns_.push_back(driver);
+    for (const Target& target : {kBias, kScale}) add_steps(driver, target);
+    for (const Target& target : {kBias, kScale}) add(play(driver, target));
+  }
+  void add_of_clock(const DriverPointer& clock) {
+    add(bell(clock, kBias));
+    add(pulses(clock, kBias));
+    for (const Target& target : {kBias, kScale}) {
+      add(power(clock, target));
+      add(logarithm(clock, target));
+    }
+    for (const Target& target : {kBias, kScale, kDelta, kH, kRoll})
+      add(wave(clock, target, {1.5, 0.5, 40}));
+    // For the bias both are listed effects, and a step of delta is a slipped index.
+    for (const Target& target : {kScale, kH, kRoll}) {
+      add_steps(clock, target);
+      add(decay(clock, target));
+    }
+  }
+  /// Of a component of the specific force.
+  void add_of_component(const DriverPointer& driver) {
+    // Products of third order.
+    add_polynomials_of_others(driver, {2});
+    for (std::size_t other = 0; other < kAxisCount; ++other)
+      for (std::size_t second = other + 1; second < kAxisCount; ++second)
+        add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
+    for (const Target& target : {kBias, kScale}) add(bend(driver, target));
+    add_steps(driver, kBias);
+  }
+  void add_of_angle(const DriverPointer& angle) {
+    add_polynomials_of_others(angle, {2, 3});
+    for (const Target& target : {kBias, kDelta, kH}) add(bell(angle, target));
+    for (const Target& target : {kRoll, kSkew}) add_polynomials(angle, target, {1, 2});
+  }
+  /// Second to eighth harmonic of the turn that is seen in part; the first is a listed effect.
+  void add_harmonics_of_h(const DriverPointer& h) {
+    const auto [low, high] = std::minmax_element(h->value[0].begin(), h->value[0].end());
+    const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
+    for (const Target& target : {kBias, kH}) add(wave(h, target, {2 * turns, turns, 8 * turns}));
+  }
+  /// What winds up with the spindle does not know that 360° are 0°.
+  void add_of_wound_up_spindle() {
+    const auto turn = std::make_shared<const Driver>(angle_without_return(log_));
+    for (const Target& target : {kBias, kScale, kDelta, kH})
+      add_polynomials(turn, target, {1, 2, 3});
+    for (const Target& target : {kDelta, kH, kSkew}) add(wave(turn, target, {0.2, 0.2, 6}));
+  }
+  void add_of_code(const DriverPointer& code) {
+    // What repeats from step to step, or every second step, is the rounding itself, or a bit.
+    constexpr double kShortestWave = 2.5;  // steps
+    add(wave(code, kBias, {1.5, 0.5, 40}, log_.adc ? kShortestWave * log_.adc->lsb_V() : 0));
+    add_polynomials(code, kBias, {2, 3, 5});
+    add(bend(code, kBias));
+    add_steps(code, kBias);
+  }
+
+  const VisitLog& log_;
+  bool any_;
+  std::vector<DriverPointer> columns_;  ///< recorded, but for their rates
+  std::vector<std::unique_ptr<SmoothTerm>> terms_;
+};
+
 }  // namespace
 
 std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
                                                       SmoothTermSelection selection) {
-  const bool any = selection == SmoothTermSelection::any;
-  std::vector<std::unique_ptr<SmoothTerm>> terms;
-  const auto add = [&](std::unique_ptr<SmoothTerm> term) { terms.push_back(std::move(term)); };
-  const auto add_polynomials = [&](const DriverPointer& driver, const Target& target,
-                                   std::initializer_list<int> degrees) {
-    for (const int degree : degrees)
-      add(driver->angle ? harmonic_series(driver, target, degree)
-                        : polynomial(driver, target, degree));
-  };
-  const auto add_steps = [&](const DriverPointer& driver, const Target& target) {
-    for (const StepEdge edge : {StepEdge::sharp, StepEdge::gradual})
-      add(step(driver, target, edge));
-  };
-  const Target bias{TermForm::bias}, scale{TermForm::scale};
-  const Target of_delta{TermForm::geometry}, of_h{TermForm::geometry, &HeadGeometry::h_rad};
-  const Target of_roll{TermForm::geometry, &HeadGeometry::roll_rad};
-  const Target of_skew{TermForm::geometry, &HeadGeometry::skew_rad};
-  std::vector<DriverPointer> columns;
-  for (Driver& each : instantaneous_drivers(log)) {
-    const auto driver = std::make_shared<const Driver>(std::move(each));
-    if (!any && !driver->varies()) continue;  // a variable that never varied drives nothing
-    const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
-    if (driver->two_valued) {
-      for (const Target& target : {bias, scale, of_h}) add_polynomials(driver, target, {1});
-      continue;
-    }
-    for (const Target& target : {bias, scale, of_delta, of_h}) {
-      // A bias or scale that follows the time or a column in a straight line is a listed effect.
-      const bool listed = (clock || column) && target.form != TermForm::geometry;
-      if (any || !listed) add_polynomials(driver, target, {1});
-      add_polynomials(driver, target, {2, 3, 5});
-    }
-    if (driver->recorded || clock) {
-      for (std::size_t other = 1; other < kAxisCount; ++other)
-        add_polynomials(driver, {.form = TermForm::scale, .other = other}, {1, 2});
-      for (std::size_t other = 0; other < kAxisCount; ++other)
-        for (std::size_t second = other; second < kAxisCount; ++second)
-          add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
-      add_polynomials(driver, of_roll, {1, 2, 3});
-      add_polynomials(driver, of_skew, {1, 2});
-    }
-    if (clock || column) {
-      add(bend(driver, bias));
-      add(bend(driver, scale));
-    }
-    if (column) {
-      columns.push_back(driver);
-      add_steps(driver, bias);
-      add_steps(driver, scale);
-      add(play(driver, bias));
-      add(play(driver, scale));
-    }
-    if (clock) {
-      add(bell(driver, bias));
-      add(pulses(driver, bias));
-      for (const Target& target : {bias, scale}) {
-        add(power(driver, target));
-        add(logarithm(driver, target));
-      }
-      for (const Target& target : {bias, scale, of_delta, of_h, of_roll})
-        add(wave(driver, target, {1.5, 0.5, 40}));
-      // For the bias both are listed effects, and a step of delta is a slipped index.
-      for (const Target& target : {scale, of_h, of_roll}) {
-        add_steps(driver, target);
-        add(decay(driver, target));
-      }
-    }
-    if (driver->in_the_twelve) {
-      // Products of third order.
-      for (std::size_t other = 1; other < kAxisCount; ++other)
-        add_polynomials(driver, {.form = TermForm::scale, .other = other}, {2});
-      for (std::size_t other = 0; other < kAxisCount; ++other)
-        for (std::size_t second = other + 1; second < kAxisCount; ++second)
-          add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
-      add(bend(driver, bias));
-      add(bend(driver, scale));
-      add_steps(driver, bias);
-    }
-    if (driver->angle) {
-      for (std::size_t other = 1; other < kAxisCount; ++other)
-        add_polynomials(driver, {.form = TermForm::scale, .other = other}, {2, 3});
-      for (const Target& target : {bias, of_delta, of_h}) add(bell(driver, target));
-      for (const Target& target : {of_roll, of_skew}) add_polynomials(driver, target, {1, 2});
-    }
-    if (driver->name == "h_deg") {
-      // Second to eighth harmonic of the turn that is seen in part; the first is a listed effect.
-      const auto [low, high] =
-          std::minmax_element(driver->value[0].begin(), driver->value[0].end());
-      const double turns = driver->varies() ? (*high - *low) / effect::kTurn_rad : 1;
-      for (const Target& target : {bias, of_h})
-        add(wave(driver, target, {2 * turns, turns, 8 * turns}));
-    }
-  }
-  // What winds up with the spindle does not know that 360° are 0°.
-  const auto turn = std::make_shared<const Driver>(angle_without_return(log));
-  for (const Target& target : {bias, scale, of_delta, of_h}) {
-    add_polynomials(turn, target, {1, 2, 3});
-  }
-  for (const Target& target : {of_delta, of_h, of_skew}) add(wave(turn, target, {0.2, 0.2, 6}));
-  const auto attitude = std::make_shared<const Driver>(load(log));
-  if (any || attitude->varies()) add(play(attitude, bias));
-  const double longest_s =
-      any ? std::numeric_limits<double>::infinity() : log.last_s() - log.first_s();
-  for (auto& term : memory_terms(log, longest_s, attitude, columns)) add(std::move(term));
-  // What repeats from step to step, or every second step, is the rounding itself, or a bit.
-  constexpr double kShortestWave = 2.5;  // steps
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const auto driver = std::make_shared<const Driver>(code_driver(log, axis));
-    if (!any && !driver->varies()) continue;
-    add(wave(driver, bias, {1.5, 0.5, 40}, log.adc ? kShortestWave * log.adc->lsb_V() : 0));
-    add_polynomials(driver, bias, {2, 3, 5});
-    add(bend(driver, bias));
-    add_steps(driver, bias);
-  }
-  for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
-    for (const int degree : {1, 2, 3}) add(dwell_course(log, of, degree));
-  for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
-    for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
-      add(head_decay(angle, of));
-  return terms;
+  TermList list(log, selection);
+  list.add_all();
+  return list.take();
 }
 
 }  // namespace plumbline

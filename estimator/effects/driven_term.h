@@ -1,0 +1,78 @@
+// What all functions of one driver have in common.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "estimator/effects/function_of_driver.h"
+
+namespace plumbline {
+
+/// A function of one driver; the shape is the derived class's.
+class DrivenTerm : public SmoothTerm {
+ public:
+  DrivenTerm(DriverPointer driver, Target target)
+      : driver_(std::move(driver)),
+        target_(target),
+        range_(driver_->span ? *driver_->span : range_of(driver_->value)) {}
+
+  std::string id() const override {
+    return "unlisted:" + driver_->name + ":" + to_string(target_.form);
+  }
+  const std::string& driver() const override { return driver_->name; }
+  TermForm form() const override { return target_.form; }
+  std::string shape() const override {
+    return function() + (driver_->past.empty() ? "" : " in the " + driver_->past) + target_.words();
+  }
+  Subject subject() const override {
+    return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
+  }
+  bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
+  void displace(const VisitLog&, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    head.*target_.angle += of_visit(0, visit, p) * effect::kRadPerDeg;
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    const double f = driver_->output_of == input.axis ? at(input.output_V, p)
+                                                      : of_visit(input.axis, input.visit, p);
+    return f * target_.factor(input);
+  }
+
+ protected:
+  virtual std::string function() const = 0;
+  /// The function at one value of the driver, for those that depend on nothing else.
+  virtual double at(double, const double*) const { return 0; }
+  virtual double of_visit(std::size_t axis, std::size_t visit, const double* p) const {
+    return at(driver_->value[axis][visit], p);
+  }
+
+  /// A place in the range.
+  ParameterInfo place(const char* name) const {
+    const auto [low, high] = range();
+    constexpr double kFine = 1e-3;
+    return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
+  }
+  const std::pair<double, double>& range() const { return range_; }
+  const Driver& variable() const { return *driver_; }
+  const Target& target() const { return target_; }
+  /// Whether what is linear in the driver is not to be told from the 12 parameters.
+  bool is_in_the_twelve() const { return driver_->in_the_twelve && target_.form == TermForm::bias; }
+
+ private:
+  static std::pair<double, double> range_of(const PerAxis<std::vector<double>>& of_axis) {
+    constexpr double kBeyond = std::numeric_limits<double>::infinity();
+    std::pair<double, double> range{kBeyond, -kBeyond};
+    for (const auto& values : of_axis)
+      for (const double value : values)
+        range = {std::min(range.first, value), std::max(range.second, value)};
+    return range;
+  }
+  DriverPointer driver_;
+  Target target_;
+  std::pair<double, double> range_;  ///< asked for whenever a parameter is described
+};
+
+}  // namespace plumbline

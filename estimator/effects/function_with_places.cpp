@@ -1,0 +1,253 @@
+// Functions of a driver at some values of which something happens.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "estimator/effects/driven_term.h"
+
+namespace plumbline {
+namespace {
+
+class Bell final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    const char* unit = variable().angle ? "rad" : "";
+    return {place("middle"),
+            {"width", unit, ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : {1.0 / 60, 1.0 / 30, 1.0 / 15}) {
+      const double width = share * (high - low);
+      const auto steps = static_cast<long>((high - low) / (1.5 * width));
+      for (long k = 0; k <= steps; ++k)
+        starts.push_back(
+            {{low + 1.5 * width * static_cast<double>(k), width, target().typical_size()}});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "bell"; }
+  double at(double value, const double* p) const override {
+    const double away = value - p[0];
+    const double x = (variable().angle ? std::remainder(away, effect::kTurn_rad) : away) / p[1];
+    return p[2] * std::exp(-0.5 * x * x);
+  }
+};
+
+class Pulses final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    constexpr double kFine = 0.1;  // of an edge, so that some readings are in it
+    const double fine = kFine * edge();
+    return {{"edge", "s", ParameterRole::index},
+            {"period", "s", ParameterRole::shape, fine},
+            {"width", "s", ParameterRole::shape, fine},
+            {"middle", "s", ParameterRole::shape, fine, true},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    constexpr int kMiddles = 4, kMostPulses = 8;
+    std::vector<Hypothesis> starts;
+    for (int pulses = 2; pulses <= kMostPulses; ++pulses) {
+      const double period = (high - low) / pulses;
+      for (int k = 0; k < kMiddles; ++k)
+        starts.push_back(
+            {{edge(), period, 0.5 * period, low + period * k / kMiddles, target().typical_size()}});
+    }
+    return starts;
+  }
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& instances) const override {
+    if (target().form != TermForm::bias) return {};
+    if (repeated.id() == "sensor.bias_step") return from_steps(instances);
+    return repeated.id() == id() ? from_waves(instances) : std::vector<Hypothesis>{};
+  }
+
+ private:
+  std::string function() const override { return "train of pulses"; }
+  double at(double value, const double* p) const override {
+    const double from_middle = std::abs(std::remainder(value - p[3], p[1]));
+    return p[4] / (1 + std::exp((from_middle - 0.5 * p[2]) / p[0]));
+  }
+  /// A part of the time from pose to pose, over which an edge is spread so that it can be moved.
+  double edge() const {
+    constexpr double kPart = 0.25;
+    const auto [low, high] = range();
+    return kPart * (high - low) / static_cast<double>(variable().value[0].size());
+  }
+  /// Two steps, a period apart, and one back.
+  std::vector<Hypothesis> from_steps(const std::vector<std::vector<double>>& steps) const {
+    if (steps.size() != 3) return {};
+    const double size = steps[0][0], first_s = steps[0][1];
+    const double width_s = steps[2][1] - first_s;
+    return {{{edge(), steps[1][1] - first_s, width_s, first_s + 0.5 * width_s, size}}};
+  }
+  /// The longest of several waves is the fundamental.
+  std::vector<Hypothesis> from_waves(const std::vector<std::vector<double>>& waves) const {
+    if (waves.size() < 2) return {};  // one alone is a wave
+    std::vector<double> longest;
+    for (const auto& wave : waves) {
+      if (wave.size() != 4) return {};  // another shape
+      if (longest.empty() || wave[1] > longest[1]) longest = wave;
+    }
+    const double period = longest[1];
+    const double crest =
+        longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
+    std::vector<Hypothesis> found;
+    for (const double share : {0.2, 0.35, 0.5, 0.65, 0.8})  // of a period
+      found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
+    return found;
+  }
+};
+
+class Bend final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", "", ParameterRole::index},
+            {"high", "", ParameterRole::index},
+            {"side", "", ParameterRole::index},
+            place("at"),
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 8;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int k = 1; k < kParts; ++k) {
+      const double at = low + (high - low) * k / kParts;
+      starts.push_back({{low, high, 1, at, target().typical_size()}});
+      // The two sides differ by a straight line.
+      if (!is_in_the_twelve()) starts.push_back({{low, high, -1, at, target().typical_size()}});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "bend"; }
+  double at(double value, const double* p) const override {
+    // A bend at the very end is none: it would follow the last readings, whatever they are.
+    constexpr double kEnd = 0.08;
+    const double end = kEnd * (p[1] - p[0]);
+    if (p[3] < p[0] + end || p[3] > p[1] - end) return 0;
+    return p[4] * std::max(0.0, p[2] * (value - p[3]));
+  }
+};
+
+class Step final : public DrivenTerm {
+ public:
+  Step(DriverPointer driver, Target target, StepEdge edge)
+      : DrivenTerm(std::move(driver), target), edge_(edge) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    // Hardly a reading lies in the edge of a sharp step: its width is not differentiated.
+    const auto width = edge_ == StepEdge::sharp ? ParameterRole::index : ParameterRole::shape;
+    return {place("at"), {"width", "", width}, {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 12;
+    const auto [low, high] = range();
+    const std::vector<double> shares =
+        edge_ == StepEdge::sharp ? std::vector{0.01} : std::vector{0.04, 0.13};
+    std::vector<Hypothesis> starts;
+    for (const double share : shares)
+      for (int k = 1; k < kParts; ++k)
+        starts.push_back(
+            {{low + (high - low) * k / kParts, share * (high - low), target().typical_size()}});
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    std::vector<Hypothesis> others;
+    if (edge_ == StepEdge::gradual) return others;
+    for (const double ratio : {0.25, 0.35, 0.5, 0.7, 1.4, 2.0, 2.8, 4.0})
+      others.push_back({{found.p[0], ratio * found.p[1], found.p[2]}});
+    // Between two readings nothing moves a sharp step: it is tried at every place.
+    constexpr double kSharp = 0.08;
+    constexpr int kPlaces = 8;  // on either side
+    for (int place = -kPlaces; place <= kPlaces; ++place)
+      others.push_back({{found.p[0] + 0.25 * place * found.p[1], kSharp * found.p[1], found.p[2]}});
+    return others;
+  }
+
+ private:
+  std::string function() const override { return "step"; }
+  double at(double value, const double* p) const override {
+    return p[2] / (1 + std::exp((p[0] - value) / p[1]));
+  }
+
+  StepEdge edge_;
+};
+
+class PlayLag final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  bool remembers() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : effect::geometric(0.01, 0.64, 7))
+      if (goes_to_and_fro(axis, share * (high - low)))
+        starts.push_back({{share * (high - low), target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "lag behind a play"; }
+  /// Drawn along in one direction only, the lag is a function of the driver itself.
+  bool goes_to_and_fro(std::size_t axis, double width) const {
+    const std::vector<double>& driver = variable().value[axis];
+    const double half = 0.5 * width;
+    bool up = false, down = false;
+    double follower = driver.front();
+    for (const double value : driver) {
+      up |= value - half > follower;
+      down |= value + half < follower;
+      follower = std::clamp(follower, value - half, value + half);
+    }
+    return up && down;
+  }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const std::vector<double>& driver = variable().value[axis];
+    const double half = 0.5 * std::abs(p[0]);
+    double follower = driver.front();
+    for (std::size_t k = 0; k <= visit; ++k)
+      follower = std::clamp(follower, driver[k] - half, driver[k] + half);
+    return p[1] * (follower - driver[visit]);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target) {
+  return std::make_unique<Bell>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
+  return std::make_unique<Pulses>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
+  return std::make_unique<Bend>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge) {
+  return std::make_unique<Step>(std::move(driver), target, edge);
+}
+std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
+  return std::make_unique<PlayLag>(std::move(driver), target);
+}
+
+}  // namespace plumbline
