@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <memory>
 
 #include "estimator/diagnosis/code_estimate.h"
@@ -468,20 +469,16 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
     }
     if (parameters.effects.size() == before) restored.left_out.push_back(found.id);
   }
-  std::vector<std::shared_ptr<const SmoothTerm>> terms;
-  if (!model.unlisted.empty())
-    for (auto& term : smooth_terms(log, SmoothTermSelection::any)) terms.push_back(std::move(term));
-  restored.owned.insert(restored.owned.end(), terms.begin(), terms.end());
+  std::vector<std::unique_ptr<SmoothTerm>> terms;
+  if (!model.unlisted.empty()) terms = smooth_terms(log, SmoothTermSelection::any);
   for (const UnlistedStructure& found : model.unlisted) {
     const std::size_t before = parameters.effects.size();
-    // Terms of one shape differ in how they are searched for, not in what they say.
-    const auto term = std::find_if(terms.begin(), terms.end(), [&](const auto& each) {
-      return each->is(found.driver, found.form, found.shape);
-    });
-    if (term != terms.end()) restore(**term, found.axes, found.parameters, parameters);
+    if (const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape))
+      restore(*term, found.axes, found.parameters, parameters);
     if (parameters.effects.size() == before)
       restored.left_out.push_back("unlisted: " + found.driver);
   }
+  std::move(terms.begin(), terms.end(), std::back_inserter(restored.owned));
   return restored;
 }
 

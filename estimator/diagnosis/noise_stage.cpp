@@ -28,28 +28,33 @@ Eigen::MatrixXd independent_columns(const Eigen::MatrixXd& block) {
   return basis;
 }
 
+/// Of each contrast, the visits whose dwells resolve it: in short ones the finest are zero.
+Eigen::ArrayXd visits_that_resolve(const VisitLog& log) {
+  Eigen::ArrayXd count = Eigen::ArrayXd::Zero(log.dwell_contrasts());
+  for (const auto& [samples, contrasts] : log.contrasts) {
+    const auto visits =
+        std::count_if(log.visits.begin(), log.visits.end(),
+                      [&, length = samples](const Visit& visit) { return visit.count == length; });
+    count += static_cast<double>(visits) *
+             (contrasts.colwise().squaredNorm().transpose().array() > 0).cast<double>();
+  }
+  return count;
+}
+
 // Scatter of the contrasts about the model. Few odd dwells do not matter; the median would not do,
 // since readings of a coarse converter are often all the same.
 PerAxis<Eigen::VectorXd> dwell_scatter_V(const SearchInput& input,
                                          const EnlargedParameters& parameters) {
   const auto predicted = predict_dwells_V(input.log, parameters);
+  const Eigen::ArrayXd resolved = visits_that_resolve(input.log).max(1);
   PerAxis<Eigen::VectorXd> sd_V;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     sd_V[i].resize(input.log.dwell_contrasts());
     for (Eigen::Index d = 0; d < sd_V[i].size(); ++d) {
       const Eigen::ArrayXd off =
           (input.observed.dwell_V[i].col(d) - predicted[i].col(d)).array().abs();
-      // Short dwells do not resolve the finest contrasts: theirs are zero.
-      const auto count = static_cast<double>(
-          std::count_if(input.log.visits.begin(), input.log.visits.end(), [&](const Visit& visit) {
-            return input.log.contrasts.at(visit.count).col(d).squaredNorm() > 0;
-          }));
-      if (count == 0) {
-        sd_V[i](d) = 1;
-        continue;
-      }
-      const double rms = std::sqrt(off.square().sum() / count);
-      const double clipped = std::sqrt(off.min(4 * rms).square().sum() / count);
+      const double rms = std::sqrt(off.square().sum() / resolved(d));
+      const double clipped = std::sqrt(off.min(4 * rms).square().sum() / resolved(d));
       // Contrasts that are all zero (single readings) carry no information.
       sd_V[i](d) = clipped > 0 ? clipped : 1;
     }

@@ -64,8 +64,9 @@ EnlargedParameters with_terms(const std::vector<std::unique_ptr<SmoothTerm>>& te
   for (ActiveEffect& active : model.effects) {
     const auto* own = dynamic_cast<const SmoothTerm*>(active.effect);
     if (own == nullptr) continue;
-    for (const auto& term : terms)
-      if (term->is(own->driver(), to_string(own->form()), own->shape())) active.effect = term.get();
+    if (const SmoothTerm* term =
+            find_term(terms, own->driver(), to_string(own->form()), own->shape()))
+      active.effect = term;
   }
   return model;
 }

@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "estimator/effects/effect.h"
+#include "estimator/effects/function_of_driver.h"
 
 namespace plumbline {
 namespace {
@@ -81,7 +82,7 @@ class Quantization final : public Effect {
   std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const Effect& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
     if (!repeated.id().starts_with("unlisted:code_") || instances.size() != 1 ||
-        !shows_finer_step(log, axis) || repeated.parameters()[1].name != "period")
+        !shows_finer_step(log, axis) || !is_wave(repeated))
       return {};  // another shape in the codes is something else
     return finer_steps(log, axis, instances.front()[1], kNearby);
   }

@@ -251,6 +251,7 @@ std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, con
                                  double shortest) {
   return std::make_unique<Wave>(std::move(driver), target, cycles, shortest);
 }
+bool is_wave(const Effect& effect) { return dynamic_cast<const Wave*>(&effect) != nullptr; }
 std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target) {
   return std::make_unique<Decay>(std::move(clock), target);
 }

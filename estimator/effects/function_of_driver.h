@@ -42,6 +42,8 @@ std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& 
 /// One wave of unknown period, none shorter than `shortest`.
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest = 0);
+/// Whether this is a wave(): its parameters are start, period and the two amplitudes.
+bool is_wave(const Effect& effect);
 /// A bell of unknown middle and width: something that happened once and took a while, or one place
 /// of an angle.
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);

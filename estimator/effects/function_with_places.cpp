@@ -70,7 +70,8 @@ class Pulses final : public DrivenTerm {
                                  const std::vector<std::vector<double>>& instances) const override {
     if (target().form != TermForm::bias) return {};
     if (repeated.id() == "sensor.bias_step") return from_steps(instances);
-    return repeated.id() == id() ? from_waves(instances) : std::vector<Hypothesis>{};
+    const bool waves = repeated.id() == id() && is_wave(repeated);
+    return waves ? from_waves(instances) : std::vector<Hypothesis>{};
   }
 
  private:
@@ -96,10 +97,8 @@ class Pulses final : public DrivenTerm {
   std::vector<Hypothesis> from_waves(const std::vector<std::vector<double>>& waves) const {
     if (waves.size() < 2) return {};  // one alone is a wave
     std::vector<double> longest;
-    for (const auto& wave : waves) {
-      if (wave.size() != 4) return {};  // another shape
+    for (const auto& wave : waves)
       if (longest.empty() || wave[1] > longest[1]) longest = wave;
-    }
     const double period = longest[1];
     const double crest =
         longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);

@@ -30,8 +30,8 @@ class Backlash final : public Effect {
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     // Approached from one side only, backlash is a zero of the spindle.
     std::vector<Hypothesis> starts;
-    const std::size_t first_way = log.goes_as_commanded ? 1 : 0;
-    const std::size_t ways = log.goes_as_commanded ? 2 : 3;
+    const std::size_t first_way = log.goes_as_commanded ? kWithinTheTurn : kShorter;
+    const std::size_t ways = log.goes_as_commanded ? kShorterOtherHalf : kOpenWay;
     for (std::size_t way = first_way; way < ways; ++way) {
       bool forward = false, backward = false;
       for (const Visit& visit : log.visits) {
@@ -66,14 +66,15 @@ class Backlash final : public Effect {
   std::vector<std::vector<double>> left_open_by(const RunHistory& run,
                                                 const std::vector<double>& p) const override {
     const VisitLog log = log_of(run);
-    const bool one_way = same_directions(log, 0, 1);
+    const bool one_way = same_directions(log, kShorter, kWithinTheTurn);
     std::vector<std::vector<double>> open;
     const bool halves = !same_directions(log, kShorter, kShorterOtherHalf);
     for (std::size_t way = 0; way <= kOpenWay; ++way) {
       for (int start = 0; start < kStarts; ++start) {
         const std::vector<double> other = {p[0], static_cast<double>(way),
                                            static_cast<double>(start)};
-        const bool same_way = other[1] == p[1] || (!halves && way != kWithinTheTurn && p[1] != 1);
+        const bool same_way = other[1] == p[1] || (!halves && way != kWithinTheTurn &&
+                                                   std::lround(p[1]) != kWithinTheTurn);
         const bool takes_one = way != kOpenWay || other[1] == p[1];
         if (other != p && takes_one && (one_way || same_way)) open.push_back(other);
       }
@@ -106,7 +107,8 @@ class Backlash final : public Effect {
   static int start_direction(const VisitLog& log, std::size_t visit, std::size_t way, int start) {
     if (start == kFromZero) {
       const double from_zero = log.visits[visit].delta_rad;
-      const double turn = way == 1 ? from_zero : std::remainder(from_zero, 2 * std::numbers::pi);
+      const double turn =
+          way == kWithinTheTurn ? from_zero : std::remainder(from_zero, 2 * std::numbers::pi);
       return turn > 0 ? 1 : (turn < 0 ? -1 : 0);
     }
     if (start == kLikeTheFirstTurn) {

@@ -209,4 +209,12 @@ std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
   return list.take();
 }
 
+const SmoothTerm* find_term(const std::vector<std::unique_ptr<SmoothTerm>>& terms,
+                            const std::string& driver, const std::string& form,
+                            const std::string& shape) {
+  const auto found = std::find_if(terms.begin(), terms.end(),
+                                  [&](const auto& term) { return term->is(driver, form, shape); });
+  return found == terms.end() ? nullptr : found->get();
+}
+
 }  // namespace plumbline

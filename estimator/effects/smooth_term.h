@@ -37,4 +37,10 @@ enum class SmoothTermSelection { shown_by_these_visits, any };
 std::vector<std::unique_ptr<SmoothTerm>> smooth_terms(const VisitLog& log,
                                                       SmoothTermSelection selection);
 
+/// The first of that driver, form and shape, null if there is none. Terms that share all three
+/// differ in how they are searched for, not in what they say.
+const SmoothTerm* find_term(const std::vector<std::unique_ptr<SmoothTerm>>& terms,
+                            const std::string& driver, const std::string& form,
+                            const std::string& shape);
+
 }  // namespace plumbline
