@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "estimator/parallel_for.h"
@@ -40,14 +41,6 @@ std::vector<Rival> best_of_families(const CandidateList& list, const CandidateGa
 
 bool same_effect(const Candidate& a, const Candidate& b) {
   return a.effect == b.effect && (a.effect->subject() == Subject::head || a.axis == b.axis);
-}
-
-EnlargedFit refit_with(const SearchInput& input, const SearchResult& result,
-                       const EnlargedParameters& base, const std::vector<Candidate>& added) {
-  EnlargedParameters model = base;
-  for (const Candidate& candidate : added) model.effects.push_back(candidate.active());
-  return fit_holding_shapes(input.log, result.observed, result.whitening, model,
-                            base.effects.size());
 }
 
 /// What the codes prove is only replaced by what they prove as well.
@@ -91,23 +84,25 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
 
   std::vector<Alternative> singles;
   // Responses at the final model: they hardly depend on the parameters.
+  const FitInput fit_input{input.log, result.observed, result.whitening};
   const CandidateGains gains_of(result.responses, without);
   const auto ranked = best_of_families(list, gains_of, gains_of.of_residual());
-  std::vector<Candidate> refined;
+  std::vector<Rival> refined;
   for (const Rival& rival : ranked) {
     // The first order may understate a nonlinear rival, but not by this much.
     if (refined.size() == kRefined || rival.gain < 0.5 * found_gain - kIndistinguishable) break;
-    if (usable(list.candidates[rival.candidate]))
-      refined.push_back(list.candidates[rival.candidate]);
+    if (usable(list.candidates[rival.candidate])) refined.push_back(rival);
   }
   std::vector<EnlargedFit> fits(refined.size());
-  parallel_for(fits.size(),
-               [&](std::size_t k) { fits[k] = refit_with(input, result, base, {refined[k]}); });
+  parallel_for(fits.size(), [&](std::size_t k) {
+    const auto& [candidate, gain] = refined[k];
+    fits[k] = fit_with_candidate(fit_input, gains_of, candidate, list.candidates[candidate], gain);
+  });
   for (std::size_t k = 0; k < fits.size(); ++k) {
     if (!fits[k].determined) continue;
     const auto free = static_cast<double>(fits[k].parameters.free_count() - base.free_count());
     if (without.chi2 - fits[k].chi2 < needed(std::max(free, found_free))) continue;
-    const std::string id = refined[k].effect->id();
+    const std::string id = list.candidates[refined[k].candidate].effect->id();
     if (id != found.effect->id() &&
         std::none_of(singles.begin(), singles.end(),
                      [&](const Alternative& s) { return s.name == id; }))
@@ -124,10 +119,11 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   while (sum.size() < kLongestSum) {
     // A sum whose first members leave most of it open is not worth the search.
     if (!sum.empty() && without.chi2 - fit.chi2 < 0.8 * found_gain) break;
+    std::optional<CandidateGains> beside;
     std::vector<Rival> order = ranked;
     if (!sum.empty()) {
-      const CandidateGains next(result.responses, fit);
-      order = best_of_families(list, next, next.of_residual());
+      beside.emplace(result.responses, fit);
+      order = best_of_families(list, *beside, beside->of_residual());
     }
     const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {
       const Candidate& candidate = list.candidates[r.candidate];
@@ -137,7 +133,8 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
     });
     if (best == order.end()) break;
     sum.push_back(list.candidates[best->candidate]);
-    fit = refit_with(input, result, base, sum);
+    fit = fit_with_candidate(fit_input, beside ? *beside : gains_of, best->candidate, sum.back(),
+                             best->gain);
     if (!fit.determined) break;
     const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
     if (sum.size() < 2 || without.chi2 - fit.chi2 < needed(free)) continue;

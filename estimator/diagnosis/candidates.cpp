@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/candidates.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -296,7 +297,7 @@ CandidateResponses some_of(const CandidateResponses& responses,
 }
 
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
-    : responses_(responses) {
+    : responses_(responses), fit_(fit) {
   model_basis_ = orthonormal_basis(fit.whitened_jacobian);
   residual_ = project(fit.whitened_residual);
   std::array<Eigen::MatrixXd, kGroups> taken;  // by the model's parameters, columns × p
@@ -342,6 +343,47 @@ Eigen::MatrixXd CandidateGains::of(const Eigen::MatrixXd& whitened) const {
         (transform_[c] * seen[g].middleRows(first, count)).colwise().squaredNorm();
   }
   return gain;
+}
+
+EnlargedParameters CandidateGains::linear_start(std::size_t place,
+                                                const Candidate& candidate) const {
+  const auto& [g, first, count] = responses_.place[place];
+  const CandidateResponses::Group& group = responses_.groups[g];
+  const Eigen::MatrixXd& model = fit_.whitened_jacobian;
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(model.rows(), model.cols() + count);
+  columns.leftCols(model.cols()) = model;
+  columns.block(group.first_row, model.cols(), group.means.rows(), count) =
+      group.means.middleCols(first, count);
+  columns.block(group.first_dwell_row, model.cols(), group.dwells.rows(), count) =
+      group.dwells.middleCols(first, count);
+  const Eigen::VectorXd norms = columns.colwise().norm().cwiseMax(1e-300);
+  const Eigen::VectorXd step =
+      norms.cwiseInverse().cwiseProduct((columns * norms.cwiseInverse().asDiagonal())
+                                            .colPivHouseholderQr()
+                                            .solve(fit_.whitened_residual));
+  EnlargedParameters start = fit_.parameters;
+  start.set_free_values(start.free_values() + step.head(model.cols()));
+  ActiveEffect active = candidate.active();
+  const auto infos = active.effect->parameters();
+  Eigen::Index column = model.cols();
+  for (std::size_t k = 0; k < infos.size(); ++k)
+    if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0)
+      active.p[k] *= step(column++);
+  return with_effect(std::move(start), active);
+}
+
+EnlargedFit fit_with_candidate(const FitInput& input, const CandidateGains& gains,
+                               std::size_t place, const Candidate& candidate, double promised) {
+  constexpr double kMostOfIt = 0.95;
+  const EnlargedFit& before = gains.fit();
+  EnlargedFit with = fit_holding_shapes(input.log, input.observed, input.whitening,
+                                        with_effect(before.parameters, candidate.active()),
+                                        before.parameters.effects.size());
+  if (with.determined && before.chi2 - with.chi2 > kMostOfIt * promised) return with;
+  EnlargedFit other = fit_enlarged(input.log, input.observed, input.whitening,
+                                   gains.linear_start(place, candidate));
+  const bool is_better = other.determined && (!with.determined || other.chi2 < with.chi2);
+  return is_better ? other : with;
 }
 
 }  // namespace plumbline

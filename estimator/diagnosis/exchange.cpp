@@ -25,7 +25,8 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   if (!without.determined) return exchanges;
   const double spent = model.price_of(subset);
   const CandidateGains gains(responses, without);
-  const std::vector<Scored> ranked = screen(model.list(), gains, gains.of_residual());
+  const Eigen::VectorXd first_order = gains.of_residual();
+  const std::vector<Scored> ranked = screen(model.list(), gains, first_order);
   for (std::size_t r = 0; r < std::min(kMostRefined, ranked.size()); ++r) {
     const std::size_t index = ranked[r].candidate;
     const Candidate& candidate = model.list().candidates[index];
@@ -34,7 +35,8 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
         candidate.hypothesis.p == replaced.hypothesis.p)
       continue;
     if (model.is_chosen_beside(subset, candidate)) continue;
-    const EnlargedFit with = model.fit_with(without.parameters, candidate.active());
+    const EnlargedFit with =
+        model.fit_with(gains, index, candidate, first_order(static_cast<Eigen::Index>(index)));
     if (!with.determined) continue;
     const double cost = with.chi2 + model.price(index);
     if (!(cost < model.stage().fit.chi2 + spent - kClearly)) continue;
@@ -119,7 +121,8 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
   std::optional<Next> best;
   double best_score = std::numeric_limits<double>::infinity();
   std::size_t refined = 0;
-  for (const Scored& s : screen(named.list, gains, gains.of_residual())) {
+  const Eigen::VectorXd first_order = gains.of_residual();
+  for (const Scored& s : screen(named.list, gains, first_order)) {
     const Candidate& candidate = named.list.candidates[s.candidate];
     const bool is_there = std::any_of(
         fit.parameters.effects.begin(), fit.parameters.effects.end(), [&](const ActiveEffect& e) {
@@ -128,7 +131,8 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
     if (model.is_certain(candidate) || (is_there && !candidate.effect->repeats())) continue;
     if (refined++ == kMostRefined) break;
     const std::size_t index = named.index[s.candidate];
-    EnlargedFit with = model.fit_with(fit.parameters, candidate.active());
+    EnlargedFit with = model.fit_with(gains, s.candidate, candidate,
+                                      first_order(static_cast<Eigen::Index>(s.candidate)));
     if (!with.determined) continue;
     const double log_p = model.log_p_of(index, fit, with, s.dof);
     const double score = log_p + (s.score - s.log_p);

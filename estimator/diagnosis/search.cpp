@@ -102,19 +102,11 @@ class Search {
 
     // First order ranks; the full response decides.
     constexpr std::size_t kRefined = 10;
-    constexpr double kMostOfIt = 0.95;
     std::vector<EnlargedFit> fits(std::min(kRefined, ranked.size()));
     parallel_for(fits.size(), [&](std::size_t k) {
       const std::size_t candidate = ranked[k].candidate;
-      fits[k] =
-          model_.fit_with(model_.stage().fit.parameters, list_.candidates[candidate].active());
-      const double promised = first_order(static_cast<Eigen::Index>(candidate));
-      // From next to nothing a place or a time constant may have run to where it explains less.
-      if (fits[k].determined && model_.stage().fit.chi2 - fits[k].chi2 > kMostOfIt * promised)
-        return;
-      EnlargedFit other = model_.fit(model_.linear_start(candidate));
-      if (other.determined && (!fits[k].determined || other.chi2 < fits[k].chi2))
-        fits[k] = std::move(other);
+      fits[k] = model_.fit_with(gains, candidate, list_.candidates[candidate],
+                                first_order(static_cast<Eigen::Index>(candidate)));
     });
     const Scored* winner = nullptr;
     EnlargedParameters with_winner;

@@ -1,6 +1,5 @@
 #include "estimator/diagnosis/search_model.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -102,30 +101,10 @@ EnlargedFit SearchModel::fit_with(const EnlargedParameters& model,
                             with_effect(model, active), model.effects.size());
 }
 
-EnlargedParameters SearchModel::linear_start(std::size_t candidate) const {
-  const auto& [g, first, count] = responses_->place[candidate];
-  const CandidateResponses::Group& group = responses_->groups[g];
-  const Eigen::MatrixXd& model = stage_.fit.whitened_jacobian;
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(model.rows(), model.cols() + count);
-  columns.leftCols(model.cols()) = model;
-  columns.block(group.first_row, model.cols(), group.means.rows(), count) =
-      group.means.middleCols(first, count);
-  columns.block(group.first_dwell_row, model.cols(), group.dwells.rows(), count) =
-      group.dwells.middleCols(first, count);
-  const Eigen::VectorXd norms = columns.colwise().norm().cwiseMax(1e-300);
-  const Eigen::VectorXd step =
-      norms.cwiseInverse().cwiseProduct((columns * norms.cwiseInverse().asDiagonal())
-                                            .colPivHouseholderQr()
-                                            .solve(stage_.fit.whitened_residual));
-  EnlargedParameters start = stage_.fit.parameters;
-  start.set_free_values(start.free_values() + step.head(model.cols()));
-  ActiveEffect active = list_.candidates[candidate].active();
-  const auto infos = active.effect->parameters();
-  Eigen::Index column = model.cols();
-  for (std::size_t k = 0; k < infos.size(); ++k)
-    if (infos[k].role == ParameterRole::amplitude && active.p[k] != 0)
-      active.p[k] *= step(column++);
-  return with_effect(std::move(start), active);
+EnlargedFit SearchModel::fit_with(const CandidateGains& gains, std::size_t place,
+                                  const Candidate& candidate, double promised) const {
+  return fit_with_candidate({input_.log, stage_.observed, stage_.whitening}, gains, place,
+                            candidate, promised);
 }
 
 EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) const {

@@ -55,16 +55,13 @@ class SearchModel {
   /// The candidates beside the model as it stands.
   const CandidateResponses& responses();
 
-  /// Fits with the noise as it stands: of any model, of one with one more effect, of this one
-  /// without some of its effects (ascending).
+  /// Fits with the noise as it stands: of any model, of one with one more effect, of one with one
+  /// more candidate (as fit_with_candidate()), of this one without some of its effects (ascending).
   EnlargedFit fit(const EnlargedParameters& parameters) const;
   EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const;
+  EnlargedFit fit_with(const CandidateGains& gains, std::size_t place, const Candidate& candidate,
+                       double promised) const;
   EnlargedFit fit_without(const std::vector<std::size_t>& effects) const;
-  /// The model with one more effect where the linear problem puts both. What follows the readings
-  /// finely may not be reached from parameters that were estimated without it. Precondition:
-  /// responses() is up to date.
-  EnlargedParameters linear_start(std::size_t candidate) const;
-
   /// A candidate that may come into the model, and the model with it.
   struct Entry {
     std::size_t candidate = 0;

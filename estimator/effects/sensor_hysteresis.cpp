@@ -29,9 +29,13 @@ class Hysteresis final : public Effect {
       return std::count(changes.begin(), changes.end(), change);
     };
     const bool both_ways = std::min(count(1), count(-1)) >= kFewest;
+    // What never falls is left with the same from the first rise on, which may come late.
+    const auto first_change =
+        std::find_if(changes.begin(), changes.end(), [](double change) { return change != 0; });
+    const bool comes_late =
+        std::min(first_change - changes.begin(), changes.end() - first_change) >= kFewest;
     for (const Ties ties : {kNothing, kAsBefore}) {
-      // What never fell is left with the same from the first rise on: a step in time.
-      if (ties == kAsBefore && (count(0) == 0 || !both_ways)) continue;
+      if (ties == kAsBefore && (count(0) == 0 || !(both_ways || comes_late))) continue;
       if (ties == kNothing &&
           std::ssize(changes) - std::max({count(-1), count(0), count(1)}) < kFewest)
         continue;

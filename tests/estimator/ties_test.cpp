@@ -2,12 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "estimator/calibrate.h"
-#include "estimator/effects/catalogue.h"
 #include "tests/estimator/synthetic_run.h"
 
 namespace plumbline {
@@ -16,6 +14,7 @@ namespace {
 using testing::ElementsAre;
 using testing::Field;
 using testing::IsEmpty;
+using testing::IsSupersetOf;
 
 const Adc kConverter{16, -5.0, 0.0};
 
@@ -67,15 +66,21 @@ TEST(Hysteresis, IsLeftOpenWhereTheForceComesBackAndNobodyKnows) {
       with_hysteresis([=](double) mutable { return random() % 2 == 0 ? 1.0 : -1.0; }));
 }
 
-// One ring after the other z rises between two rings only: kept from there on, that is a step.
-TEST(Hysteresis, OfAForceThatNeverFallsIsNotKept) {
-  const SyntheticRun data = synthetic_run(3, kConverter);
-  const VisitLog log = make_visit_log(data.run, data.description);
-  const auto& all = effect_catalogue();
-  const Effect& hysteresis = **std::find_if(all.begin(), all.end(), [](const Effect* effect) {
-    return effect->id() == "sensor.hysteresis";
-  });
-  for (const Hypothesis& hypothesis : hysteresis.hypotheses(log, 2)) EXPECT_EQ(hypothesis.p[2], 0);
+// One ring after the other z rises between two rings only: its hysteresis shows in the first ring
+// alone, on which nothing had risen yet. So would a step between the codes of two rings, or in
+// time.
+TEST(Hysteresis, OfAForceThatNeverFallsShowsInTheFirstRing) {
+  SyntheticRun data = synthetic_run(3, kConverter);
+  const double half_width_V = 6 * kConverter.lsb_V();
+  for (const Pose& pose : data.run.poses)
+    for (std::size_t k = 0; k < pose.count; ++k)
+      if (pose.h_deg > 0) data.run.samples.u_V[2][pose.first + k] += half_width_V;
+  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.hysteresis")));
+  const FoundEffect& found = result.diagnosis.effects[0];
+  EXPECT_THAT(found.alternatives, IsSupersetOf({"adc.code_step", "sensor.bias_step"}));
+  const EffectParameter& w = found.parameters[0];
+  EXPECT_NEAR(w.value, 2 * half_width_V / data.truth[2][2], 4 * w.u);
 }
 
 }  // namespace
