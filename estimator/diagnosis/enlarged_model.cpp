@@ -262,6 +262,10 @@ Eigen::Index stacked_rows(const VisitLog& log) {
 
 namespace {
 
+bool is_scale(const ActiveEffect& active, const ParameterInfo& info, std::size_t k) {
+  return active.free[k] && info.role == ParameterRole::shape && !info.place;
+}
+
 // Time constants, widths and the like keep their sign, and sensitivities about their size: no
 // effect takes their place.
 bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
@@ -275,11 +279,23 @@ bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& star
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
     for (std::size_t k = 0; k < infos.size(); ++k)
-      if (active.free[k] && infos[k].role == ParameterRole::shape && !infos[k].place &&
-          !(active.p[k] * start.effects[e].p[k] > 0))
-        return false;
+      if (is_scale(active, infos[k], k) && !(active.p[k] * start.effects[e].p[k] > 0)) return false;
   }
   return true;
+}
+
+/// A time constant that the readings hardly determine must not hold up all others by running across
+/// zero: it stops short of that.
+void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& trial) {
+  constexpr double kLeastLeft = 0.1;
+  for (std::size_t e = 0; e < trial.effects.size(); ++e) {
+    ActiveEffect& active = trial.effects[e];
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      const double least = kLeastLeft * from.effects[e].p[k];
+      if (is_scale(active, infos[k], k) && !(active.p[k] / least > 1)) active.p[k] = least;
+    }
+  }
 }
 
 Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
@@ -420,21 +436,29 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
 
     const Eigen::VectorXd step =
         norms.cwiseInverse().cwiseProduct(qr.solve(fit.whitened_residual.head(rows)));
-    double share = 1;
-    bool improved = false;
-    for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
-      EnlargedParameters trial = fit.parameters;
-      trial.set_free_values(fit.parameters.free_values() + share * step);
-      if (!makes_sense(trial, start)) continue;
-      const Eigen::VectorXd residual = whitened_residual(trial);
-      const double chi2 = residual.squaredNorm();
-      if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;
-      improved = true;
-      fit.converged = fit.chi2 - chi2 < 1e-6;
-      fit.parameters = trial;
-      fit.whitened_residual = residual;
-      fit.chi2 = chi2;
-    }
+    bool improved = false, refused = false;
+    const auto try_steps = [&](bool stopping_short) {
+      double share = 1;
+      for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
+        EnlargedParameters trial = fit.parameters;
+        trial.set_free_values(fit.parameters.free_values() + share * step);
+        if (stopping_short) stop_short_of_zero(fit.parameters, trial);
+        if (!makes_sense(trial, start)) {
+          refused = true;
+          continue;
+        }
+        const Eigen::VectorXd residual = whitened_residual(trial);
+        const double chi2 = residual.squaredNorm();
+        if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;
+        improved = true;
+        fit.converged = fit.chi2 - chi2 < 1e-6;
+        fit.parameters = trial;
+        fit.whitened_residual = residual;
+        fit.chi2 = chi2;
+      }
+    };
+    try_steps(false);
+    if (!improved && refused) try_steps(true);
     if (!improved) fit.converged = true;  // no direction leads down any more
   }
   const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();

@@ -86,10 +86,11 @@ Eigen::VectorXd crossing_variance_V2(const VisitLog& log, const EnlargedParamete
 }
 
 /// Variance of the prediction of each mean from visits that effects leave open: by how much one way
-/// or the other differs from what the model says.
-PerAxis<Eigen::VectorXd> variance_at_ties_V2(const VisitLog& log,
-                                             const EnlargedParameters& parameters,
-                                             const PerAxis<Eigen::VectorXd>& predicted_V) {
+/// or the other differs from what the model says; at the first visit the square of what the effect
+/// does elsewhere.
+PerAxis<Eigen::VectorXd> variance_left_open_V2(const VisitLog& log,
+                                               const EnlargedParameters& parameters,
+                                               const PerAxis<Eigen::VectorXd>& predicted_V) {
   PerAxis<Eigen::VectorXd> variance_V2;
   variance_V2.fill(Eigen::VectorXd::Zero(predicted_V[0].size()));
   for (std::size_t k = 0; k < parameters.effects.size(); ++k) {
@@ -102,6 +103,11 @@ PerAxis<Eigen::VectorXd> variance_at_ties_V2(const VisitLog& log,
         variance_V2[i] +=
             (otherwise_V[i] - predicted_V[i]).cwiseAbs2() / static_cast<double>(ways.size());
     }
+    if (!parameters.effects[k].effect->guesses_at_start()) continue;
+    const PerAxis<Eigen::VectorXd> without_V = predict_means_V(log, without_effect(parameters, k));
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      variance_V2[i](0) += (predicted_V[i] - without_V[i]).squaredNorm() /
+                           static_cast<double>(predicted_V[i].size());
   }
   return variance_V2;
 }
@@ -136,7 +142,8 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
   Stage stage;
   stage.observed = input.observed;
   stage.whitening.dwell_sd_V = dwell_scatter_V(input, parameters);
-  const PerAxis<Eigen::VectorXd> ties_V2 = variance_at_ties_V2(input.log, parameters, predicted);
+  const PerAxis<Eigen::VectorXd> left_open_V2 =
+      variance_left_open_V2(input.log, parameters, predicted);
   parallel_for(kAxisCount, [&](std::size_t i) {
     Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
     const bool freed = before.freed != nullptr && before.freed->coarse[i];
@@ -171,17 +178,17 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
         return noise.pool(residual_V, design,
                           before.start != nullptr ? &(*before.start)[i].power : nullptr);
       };
-      if (ties_V2[i].maxCoeff() > 0) stage.crossing_V2[i] = ties_V2[i];
-      const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2 + ties_V2[i];
+      if (left_open_V2[i].maxCoeff() > 0) stage.crossing_V2[i] = left_open_V2[i];
+      const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2 + left_open_V2[i];
       stage.noise[i] = pool(own_V2);
       // Where the response is nothing but steps, only the visits near their edges say anything.
       if (has_effect_on(parameters, i) && !input.log.codes[i].coarser_lattice) {
         constexpr double kMatters = 0.1;
-        const double mean_V2 = (stage.noise[i].covariance.diagonal() - ties_V2[i]).mean();
+        const double mean_V2 = (stage.noise[i].covariance.diagonal() - left_open_V2[i]).mean();
         const Eigen::VectorXd crossing_V2 =
             crossing_variance_V2(input.log, parameters, i, predicted[i], std::sqrt(mean_V2));
         if (crossing_V2.maxCoeff() > kMatters * mean_V2) {
-          stage.crossing_V2[i] = ties_V2[i] + crossing_V2;
+          stage.crossing_V2[i] = left_open_V2[i] + crossing_V2;
           stage.noise[i] = pool(own_V2 + crossing_V2);
         }
       }

@@ -31,6 +31,7 @@ class DrivenTerm : public SmoothTerm {
     return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
   }
   bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
+  bool guesses_at_start() const override { return !driver_->past.empty(); }
   void displace(const VisitLog&, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     head.*target_.angle += of_visit(0, visit, p) * effect::kRadPerDeg;

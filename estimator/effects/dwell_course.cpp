@@ -43,6 +43,7 @@ class DwellCourse final : public SmoothTerm {
   }
   Subject subject() const override { return Subject::sensor; }
   bool remembers() const override { return of_ == CourseOf::step; }
+  bool guesses_at_start() const override { return remembers(); }
   bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     std::vector<ParameterInfo> infos;

@@ -100,6 +100,9 @@ class Effect {
   virtual AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const;
   /// Whether it depends on earlier visits, or on what was recorded then.
   virtual bool remembers() const { return false; }
+  /// Whether its response at a visit before which nothing is recorded is a guess that no parameter
+  /// stands for.
+  virtual bool guesses_at_start() const { return false; }
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&, std::size_t /*axis*/) const { return false; }
   /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.

@@ -194,6 +194,7 @@ class PlayLag final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   bool remembers() const override { return true; }
+  bool guesses_at_start() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
   }

@@ -29,6 +29,7 @@ class HeadDecay final : public SmoothTerm {
   }
   Subject subject() const override { return Subject::head; }
   bool remembers() const override { return of_ == DecayOf::way; }
+  bool guesses_at_start() const override { return remembers(); }
   bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     // true_at 0: the angle is right in the end; 1: it was right on arrival.

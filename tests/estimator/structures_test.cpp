@@ -97,5 +97,24 @@ TEST(Structure, WhatDependsOnTheDirectionOfTheTurnIsNoPolynomialOfIt) {
        "polynomial of degree 1 in the direction of the last turn of delta within 360 degrees"});
 }
 
+// The head came to the first pose from its zero, which nothing recorded says: the first pose tells
+// nothing of what depends on the way, and is not blamed.
+TEST(Structure, WhatDependsOnTheWaySaysNothingOfTheFirstPose) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 20;
+  options.more_x_V = [h_rad = 0.0, change_rad = 0.0, last_s = 0.0](const auto& a_g,
+                                                                   double t_s) mutable {
+    constexpr double kBetweenPoses_s = 1;
+    const double to_rad = std::atan2(a_g[2], std::hypot(a_g[0], a_g[1]));
+    if (t_s > last_s + kBetweenPoses_s) change_rad = to_rad - h_rad;
+    h_rad = to_rad;
+    last_s = t_s;
+    return 2e-3 * change_rad;
+  };
+  expect_only_structure(
+      options, {"previous_pose", "bias", "polynomial of degree 1 in the change of h since"});
+}
+
 }  // namespace
 }  // namespace plumbline

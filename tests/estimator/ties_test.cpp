@@ -83,5 +83,34 @@ TEST(Hysteresis, OfAForceThatNeverFallsShowsInTheFirstRing) {
   EXPECT_NEAR(w.value, 2 * half_width_V / data.truth[2][2], 4 * w.u);
 }
 
+// In random order the first pose shows that the head came to it from its zero: that pose was
+// blamed, or a step behind it.
+TEST(Settling, KnowsThatTheHeadMayComeFromItsZero) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  constexpr double kSettling_V_per_g = 1e-3, kTau_s = 0.1;
+  const double gamma = 9.8101 / kStandardGravity_mps2;
+  options.more_x_V = [=, now_g = gamma, from_g = gamma, arrival_s = 0.0, last_s = 0.0](
+                         const auto& all_g, double t_s) mutable {
+    constexpr double kBetweenPoses_s = 1;
+    if (t_s > last_s + kBetweenPoses_s) {
+      from_g = now_g;
+      arrival_s = t_s;
+    }
+    now_g = all_g[0];
+    last_s = t_s;
+    return kSettling_V_per_g * (from_g - now_g) * std::exp(-(t_s - arrival_s) / kTau_s);
+  };
+  const SyntheticRun data = synthetic_run(3, kConverter, options);
+  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.settling")));
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  const auto& p = result.diagnosis.effects[0].parameters;
+  EXPECT_NEAR(p[0].value, kSettling_V_per_g / data.truth[0][0], 4 * p[0].u);
+  EXPECT_NEAR(p[1].value, kTau_s, 4 * p[1].u);
+}
+
 }  // namespace
 }  // namespace plumbline
