@@ -382,8 +382,8 @@ EnlargedFit fit_with_candidate(const FitInput& input, const CandidateGains& gain
   if (with.determined && before.chi2 - with.chi2 > kMostOfIt * promised) return with;
   EnlargedFit other = fit_enlarged(input.log, input.observed, input.whitening,
                                    gains.linear_start(place, candidate));
-  const bool is_better = other.determined && (!with.determined || other.chi2 < with.chi2);
-  return is_better ? other : with;
+  if (other.determined && (!with.determined || other.chi2 < with.chi2)) return other;
+  return with;
 }
 
 }  // namespace plumbline

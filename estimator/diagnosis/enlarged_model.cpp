@@ -262,7 +262,7 @@ Eigen::Index stacked_rows(const VisitLog& log) {
 
 namespace {
 
-bool is_scale(const ActiveEffect& active, const ParameterInfo& info, std::size_t k) {
+bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, std::size_t k) {
   return active.free[k] && info.role == ParameterRole::shape && !info.place;
 }
 
@@ -279,7 +279,8 @@ bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& star
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
     for (std::size_t k = 0; k < infos.size(); ++k)
-      if (is_scale(active, infos[k], k) && !(active.p[k] * start.effects[e].p[k] > 0)) return false;
+      if (has_a_sign_to_keep(active, infos[k], k) && !(active.p[k] * start.effects[e].p[k] > 0))
+        return false;
   }
   return true;
 }
@@ -293,7 +294,8 @@ void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& tria
     const auto infos = active.effect->parameters();
     for (std::size_t k = 0; k < infos.size(); ++k) {
       const double least = kLeastLeft * from.effects[e].p[k];
-      if (is_scale(active, infos[k], k) && !(active.p[k] / least > 1)) active.p[k] = least;
+      if (has_a_sign_to_keep(active, infos[k], k) && !(active.p[k] / least > 1))
+        active.p[k] = least;
     }
   }
 }

@@ -95,9 +95,8 @@ class Hysteresis final : public Effect {
   /// With how the head came to the first visit.
   static double at_the_start(const VisitLog& log, double first_g, std::size_t axis,
                              const double* p) {
-    return p[1] < 0.5 ? 0
-                      : sign_of(first_g -
-                                Eigen::Vector3d(log.gamma, 0, 0)(static_cast<Eigen::Index>(axis)));
+    if (std::lround(p[1]) == kUnknown) return 0;
+    return sign_of(first_g - specific_force_g({}, log.gamma)(static_cast<Eigen::Index>(axis)));
   }
   static double commanded_change(const VisitLog& log, std::size_t visit, std::size_t axis,
                                  const double* p) {

@@ -34,7 +34,7 @@ class Settling final : public Effect {
   // That this run began at the zero says nothing of a later set.
   std::vector<std::vector<double>> left_open_by(const RunHistory&,
                                                 const std::vector<double>& p) const override {
-    if (p[2] < 0.5) return {};
+    if (std::lround(p[2]) == kAtRest) return {};
     return {with_other_start(p)};
   }
   double term_g(const TermInput& input, const double* p) const override {
@@ -52,15 +52,15 @@ class Settling final : public Effect {
   /// or it comes from its zero.
   enum Start { kAtRest, kFromZero };
   static std::vector<double> with_other_start(std::vector<double> p) {
-    p[2] = p[2] > 0.5 ? kAtRest : kFromZero;
+    p[2] = std::lround(p[2]) == kAtRest ? kFromZero : kAtRest;
     return p;
   }
   static double came_from_g(const TermInput& input, const double* p) {
     const auto i = static_cast<Eigen::Index>(input.axis);
     if (input.log.before(input.visit) != nullptr)
       return input.a_g[input.visit - 1](i) - input.a_g[input.visit](i);
-    if (p[2] < 0.5) return 0;
-    return Eigen::Vector3d(input.log.gamma, 0, 0)(i) - input.a_g[input.visit](i);
+    if (std::lround(p[2]) == kAtRest) return 0;
+    return specific_force_g({}, input.log.gamma)(i) - input.a_g[input.visit](i);
   }
 };
 
