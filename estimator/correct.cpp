@@ -68,30 +68,24 @@ Corrected correct_readings(const CertifiedModel& model, const SampleTable& readi
   Corrected result;
   const VisitLog log = make_visit_log(as_visits(readings, a_g), description);
   const RestoredModel restored = restore_model(model, log);
-  std::vector<ActiveEffect> effects;
+  EnlargedParameters applied;
+  for (std::size_t i = 0; i < kAxisCount; ++i) applied.twelve[i] = model.final[i].value;
   for (const ActiveEffect& active : restored.parameters.effects) {
     const bool good = can_be_computed(*active.effect);
     add_name(good ? result.applied : result.left_out, active.effect->id());
-    if (good) effects.push_back(active);
+    if (good) applied.effects.push_back(active);
   }
   for (const std::string& name : restored.left_out) add_name(result.left_out, name);
 
-  const std::vector<Eigen::Vector3d> bare_g = a_g;
-  for (int pass = 0; pass < kRepetitions && !effects.empty(); ++pass) {
-    std::vector<Eigen::Vector3d> next_g = bare_g;
+  for (int pass = 0; pass < kRepetitions && !applied.effects.empty(); ++pass) {
+    const PerAxis<Eigen::VectorXd> predicted_V = predict_means_V(log, applied, a_g);
     for (std::size_t k = 0; k < a_g.size(); ++k) {
-      Eigen::Vector3d terms_V = Eigen::Vector3d::Zero();
-      const Eigen::Vector3d response_V = K_V_per_g * a_g[k];
-      for (const ActiveEffect& active : effects) {
-        const auto axis = static_cast<Eigen::Index>(active.axis);
-        const double K_ii = K_V_per_g(axis, axis);
-        const TermInput input{
-            log, k, active.axis, a_g, response_V(axis) / K_ii, U0_V(axis) + response_V(axis), K_ii};
-        terms_V(axis) += K_ii * active.effect->term_g(input, active.p.data());
-      }
-      next_g[k] -= inverse.solve(terms_V);
+      Eigen::Vector3d off_V;
+      for (std::size_t i = 0; i < kAxisCount; ++i)
+        off_V(static_cast<Eigen::Index>(i)) =
+            readings.u_V[i][k] - predicted_V[i](static_cast<Eigen::Index>(k));
+      a_g[k] += inverse.solve(off_V);
     }
-    a_g = std::move(next_g);
   }
   result.a_mps2.reserve(a_g.size());
   for (const Eigen::Vector3d& a : a_g) result.a_mps2.push_back(kStandardGravity_mps2 * a);

@@ -94,9 +94,24 @@ struct Baseline {
   const EnlargedParameters& model;
   std::vector<HeadGeometry> head;    ///< with the model's own effects
   std::vector<Eigen::Vector3d> a_g;  ///< seen through that geometry
+  PerAxis<std::vector<TermInput>> inputs;
 
-  TermInput input(std::size_t axis, Eigen::Index visit) const {
-    return term_input(log, model.twelve[axis], axis, a_g, static_cast<std::size_t>(visit));
+  Baseline(const VisitLog& of_log, const EnlargedParameters& of_model)
+      : log(of_log),
+        model(of_model),
+        head(head_geometries(of_log, of_model)),
+        a_g(specific_forces_g(of_log, of_model)) {
+    parallel_for(kAxisCount, [this](std::size_t axis) {
+      for (std::size_t k = 0; k < a_g.size(); ++k)
+        inputs[axis].push_back(term_input(log, model, axis, a_g, k));
+    });
+  }
+  // The inputs refer to the forces.
+  Baseline(const Baseline&) = delete;
+  Baseline& operator=(const Baseline&) = delete;
+
+  const TermInput& input(std::size_t axis, Eigen::Index visit) const {
+    return inputs[axis][static_cast<std::size_t>(visit)];
   }
 };
 
@@ -104,7 +119,7 @@ struct Baseline {
 void set_sensor_response(const Baseline& base, const ActiveEffect& active,
                          Eigen::Ref<Eigen::VectorXd> change) {
   for (Eigen::Index k = 0; k < change.size(); ++k) {
-    const TermInput input = base.input(active.axis, k);
+    const TermInput& input = base.input(active.axis, k);
     change(k) = input.K_V_per_g * active.effect->term_g(input, active.p.data());
   }
 }
@@ -232,7 +247,7 @@ CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateLis
     group.first_dwell_row = mean_rows(log) + axis * log.dwell_contrasts() * n;
     group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * rows : 0, columns);
   }
-  const Baseline base{log, model, head_geometries(log, model), specific_forces_g(log, model)};
+  const Baseline base(log, model);
   const std::vector<Block> blocks = blocks_of(responses);
   parallel_for(blocks.size(), [&](std::size_t b) {
     const auto& [g, first, count] = blocks[b];

@@ -130,40 +130,49 @@ HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometr
       (specific_force_g(above, log.gamma) - specific_force_g(below, log.gamma)) / (2 * kStep_rad)};
 }
 
-TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
-                     const std::vector<Eigen::Vector3d>& a_g, std::size_t visit) {
+namespace {
+
+using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
+
+/// Without the effects of the model.
+TermInput bare_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
+                     const Forces& a_g, std::size_t visit) {
   const double K_ii = twelve(static_cast<Eigen::Index>(axis));
   const double response_V = twelve.head<3>().dot(a_g[visit]);
   return {log, visit, axis, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
 }
 
-namespace {
-
-using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
-
-/// Calls work(input, active effect) for every sensor effect of one axis at every visit.
-template <class Work>
-void for_sensor_terms(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
-                      const Forces& a_g, const Work& work) {
-  for (std::size_t k = 0; k < log.visits.size(); ++k) {
-    const TermInput input = term_input(log, parameters.twelve[axis], axis, a_g, k);
-    for (const ActiveEffect& active : parameters.effects) {
-      if (active.effect->subject() == Subject::sensor && active.axis == axis) work(input, active);
-    }
-  }
+bool is_of_sensor(const ActiveEffect& active, std::size_t axis) {
+  return active.effect->subject() == Subject::sensor && active.axis == axis;
 }
+
+/// Sum of the axis's terms at one visit that are the converter's, or of those that are not.
+double terms_V(const EnlargedParameters& parameters, const TermInput& input, bool at_converter) {
+  double sum_V = 0;
+  for (const ActiveEffect& active : parameters.effects)
+    if (is_of_sensor(active, input.axis) && active.effect->at_converter() == at_converter)
+      sum_V += input.K_V_per_g * active.effect->term_g(input, active.p.data());
+  return sum_V;
+}
+
+}  // namespace
+
+TermInput term_input(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
+                     const Forces& a_g, std::size_t visit) {
+  TermInput input = bare_input(log, parameters.twelve[axis], axis, a_g, visit);
+  input.output_V += terms_V(parameters, input, false);
+  return input;
+}
+
+namespace {
 
 Eigen::VectorXd means_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
                                 std::size_t axis, const Forces& a_g) {
-  const Eigen::Vector4d& twelve = parameters.twelve[axis];
   Eigen::VectorXd mean_V(std::ssize(a_g));
-  for (Eigen::Index k = 0; k < mean_V.size(); ++k)
-    mean_V(k) = twelve(3) + twelve.head<3>().dot(a_g[static_cast<std::size_t>(k)]);
-  for_sensor_terms(log, parameters, axis, a_g,
-                   [&](const TermInput& input, const ActiveEffect& active) {
-                     mean_V(static_cast<Eigen::Index>(input.visit)) +=
-                         input.K_V_per_g * active.effect->term_g(input, active.p.data());
-                   });
+  for (Eigen::Index k = 0; k < mean_V.size(); ++k) {
+    const TermInput input = term_input(log, parameters, axis, a_g, static_cast<std::size_t>(k));
+    mean_V(k) = input.output_V + terms_V(parameters, input, true);
+  }
   return mean_V;
 }
 
@@ -190,21 +199,15 @@ Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& 
                                  const std::vector<HeadAtVisit>& head) {
   Eigen::MatrixXd dwell_V = Eigen::MatrixXd::Zero(std::ssize(a_g), log.dwell_contrasts());
   if (!has_effect_within_dwell(parameters)) return dwell_V;
-  for_sensor_terms(
-      log, parameters, axis, a_g, [&](const TermInput& input, const ActiveEffect& active) {
-        if (active.effect->within_dwell())
-          dwell_V.row(static_cast<Eigen::Index>(input.visit)) += dwell_contrasts_V(input, active);
-      });
+  for (const ActiveEffect& active : parameters.effects) {
+    if (!is_of_sensor(active, axis) || !active.effect->within_dwell()) continue;
+    for (Eigen::Index k = 0; k < dwell_V.rows(); ++k)
+      dwell_V.row(k) += dwell_contrasts_V(
+          term_input(log, parameters, axis, a_g, static_cast<std::size_t>(k)), active);
+  }
   for (const auto& [visit, course] : head)
     dwell_V.row(visit) += course.contrasts_V(parameters.twelve[axis]);
   return dwell_V;
-}
-
-PerAxis<Eigen::VectorXd> means_V(const VisitLog& log, const EnlargedParameters& parameters,
-                                 const Forces& a_g) {
-  PerAxis<Eigen::VectorXd> mean_V;
-  for (std::size_t i = 0; i < kAxisCount; ++i) mean_V[i] = means_of_axis_V(log, parameters, i, a_g);
-  return mean_V;
 }
 
 PerAxis<Eigen::MatrixXd> dwells_V(const VisitLog& log, const EnlargedParameters& parameters,
@@ -225,7 +228,14 @@ bool has_effect_within_dwell(const EnlargedParameters& parameters) {
 
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
                                          const EnlargedParameters& parameters) {
-  return means_V(log, parameters, specific_forces_g(log, parameters));
+  return predict_means_V(log, parameters, specific_forces_g(log, parameters));
+}
+
+PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                         const Forces& a_g) {
+  PerAxis<Eigen::VectorXd> mean_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) mean_V[i] = means_of_axis_V(log, parameters, i, a_g);
+  return mean_V;
 }
 
 Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active) {
@@ -337,7 +347,7 @@ std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters)
 
 Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters) {
   const Forces a_g = specific_forces_g(log, parameters);
-  return stacked(means_V(log, parameters, a_g), dwells_V(log, parameters, a_g));
+  return stacked(predict_means_V(log, parameters, a_g), dwells_V(log, parameters, a_g));
 }
 
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {

@@ -50,13 +50,16 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active);
 EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect);
 
-/// What a term of an axis may depend on at one visit, `twelve` being the axis's parameters and
-/// `a_g` the specific forces of all visits, which must live as long.
-TermInput term_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
+/// What a term of an axis may depend on at one visit, beside the effects of the model; `a_g` are
+/// the specific forces of all visits, which must live as long.
+TermInput term_input(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
                      const std::vector<Eigen::Vector3d>& a_g, std::size_t visit);
 
 /// Predicted pose means, V, one vector of n visits per axis, full nonlinear response.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters);
+/// The same under given specific forces, whatever the head effects of the model say of them.
+PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                         const std::vector<Eigen::Vector3d>& a_g);
 
 /// Whether the model has effects that change while the head rests: only then are the rows of the
 /// dwells anything but zero.

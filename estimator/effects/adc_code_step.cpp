@@ -11,18 +11,25 @@ class CodeStep final : public Effect {
   std::string id() const override { return "adc.code_step"; }
   Subject subject() const override { return Subject::sensor; }
   bool repeats() const override { return true; }
+  bool at_converter() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     constexpr double kFine_V = 2e-5;  // well within the noise that rounds the step off
     return {{"c", "V", ParameterRole::amplitude}, {"at", "V", ParameterRole::shape, kFine_V, true}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
+    std::vector<double> means_V;
+    for (const Visit& visit : log.visits) means_V.push_back(visit.mean_V[axis]);
+    std::sort(means_V.begin(), means_V.end());
+    // All edges between the same two poses say the same; noise rounds a step off over some of its
+    // standard deviations.
+    const double apart_V = 1.5 * log.input_sd_V[axis];
     std::vector<Hypothesis> starts;
-    const double low = log.lowest_V[axis], high = log.highest_V[axis];
-    // Noise rounds the step off over some of its standard deviations.
-    const double fitting = (high - low) / std::max(1.5 * log.input_sd_V[axis], 1e-9);
-    const int boundaries = static_cast<int>(std::clamp(fitting, 64.0, 128.0));
-    for (int k = 1; k < boundaries; ++k) {
-      starts.push_back({{1e-5, low + (high - low) * k / boundaries}});
+    double last_V = means_V.front();
+    for (std::size_t k = 1; k < means_V.size(); ++k) {
+      const double at_V = 0.5 * (means_V[k - 1] + means_V[k]);
+      if (at_V - last_V < apart_V) continue;
+      starts.push_back({{1e-5, at_V}});
+      last_V = at_V;
     }
     return starts;
   }

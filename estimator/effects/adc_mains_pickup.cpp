@@ -7,8 +7,8 @@ namespace plumbline {
 namespace {
 
 // Mains pickup: A·sin(2πft + φ) in every sample. It lives inside the dwell; in the means only what
-// averaging leaves of it is seen. A sampled line cannot be told from its alias, so f is at most
-// half the sampling rate.
+// averaging leaves of it is seen. Where dwells begin a whole number of samples apart, a line cannot
+// be told from its alias, and f is at most half the sampling rate.
 class MainsPickup final : public Effect {
  public:
   std::string id() const override { return "adc.mains_pickup"; }
@@ -31,8 +31,9 @@ class MainsPickup final : public Effect {
     const auto n = static_cast<double>(visit.count);
     // Mean of n equally spaced values of a sine: Dirichlet's kernel about the middle of the dwell.
     const double half = 0.5 * effect::kTurn_rad * p[1] * visit.step_s;
-    const double kernel =
-        std::abs(std::sin(half)) < 1e-12 ? 1 : std::sin(n * half) / (n * std::sin(half));
+    const double kernel = std::abs(std::sin(half)) < 1e-12
+                              ? std::cos(n * half) / std::cos(half)
+                              : std::sin(n * half) / (n * std::sin(half));
     return kernel * p[0] * std::sin(phase_rad(visit, p) + (n - 1) * half);
   }
   void normalise(std::vector<double>& p) const override {

@@ -19,6 +19,7 @@ class Quantization final : public Effect {
  public:
   std::string id() const override { return "adc.quantization"; }
   Subject subject() const override { return Subject::sensor; }
+  bool at_converter() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"lsb", "V", ParameterRole::index},
             {"origin", "V", ParameterRole::index},

@@ -13,6 +13,7 @@ class StuckBitEffect final : public Effect {
   std::string id() const override { return "adc.stuck_bit"; }
   Subject subject() const override { return Subject::sensor; }
   bool repeats() const override { return true; }
+  bool at_converter() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"bit", "", ParameterRole::index},
             {"value", "", ParameterRole::index},

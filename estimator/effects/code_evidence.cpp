@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "estimator/noise/chi_squared.h"
@@ -131,12 +132,16 @@ std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const
   constexpr std::size_t kReadingsPerCode = 4;  // at least, so that none is missing by chance
   std::size_t dwells = 0;
   for (const Pose& pose : set.poses) {
-    const std::vector<std::int64_t> codes =
-        without_bits(codes_seen(readings_of(set, axis, pose), adc), stuck);
-    if (pose.count < kReadingsPerCode * codes.size()) continue;
-    const bool over = std::adjacent_find(codes.begin(), codes.end(),
-                                         [](auto a, auto b) { return b - a > 1; }) != codes.end();
-    dwells += over ? 1 : 0;
+    std::map<std::int64_t, std::size_t> readings;
+    for (const std::int64_t code : without_bits(codes_of(readings_of(set, axis, pose), adc), stuck))
+      ++readings[code];
+    if (pose.count < kReadingsPerCode * readings.size()) continue;
+    // In the tails of noise a code is missing soon: only one between two that are common counts.
+    const auto over =
+        std::adjacent_find(readings.begin(), readings.end(), [](const auto& a, const auto& b) {
+          return b.first - a.first > 1 && std::min(a.second, b.second) >= kReadingsPerCode;
+        });
+    dwells += over != readings.end() ? 1 : 0;
   }
   return dwells;
 }

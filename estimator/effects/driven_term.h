@@ -30,6 +30,7 @@ class DrivenTerm : public SmoothTerm {
   Subject subject() const override {
     return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
   }
+  bool at_converter() const override { return driver_->output_of.has_value(); }
   bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
   bool guesses_at_start() const override { return !driver_->past.empty(); }
   void displace(const VisitLog&, std::size_t visit, const double* p,

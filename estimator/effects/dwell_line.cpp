@@ -19,54 +19,79 @@ constexpr Eigen::Index kFewestDwells = 10;
 // real lines are beyond doubt in thousands of readings.
 constexpr double kFalseAlarm = 1e-8;
 
-/// All dwells of one axis, side by side.
+/// All dwells of one axis, side by side: their course, or what their means leave.
 struct Dwells {
-  Eigen::ArrayXd t_s;       ///< first sample of each, from the first of all
-  double origin_s = 0;      ///< of those times, on the clock of the run
-  double step_s = 0;        ///< between samples
-  double samples = 0;       ///< of all
-  Eigen::MatrixXd off_V;    ///< samples × dwells, without mean and without what changes slowly
-                            ///< within a dwell; a shorter dwell ends in zeros
-  Eigen::MatrixXd removed;  ///< orthonormal functions that the longest was freed of
+  Eigen::ArrayXd t_s;         ///< first sample of each, from the first of all
+  double origin_s = 0;        ///< of those times, on the clock of the run
+  double step_s = 0;          ///< between samples
+  double samples = 0;         ///< of all
+  Eigen::MatrixXd off_V;      ///< samples × dwells; a shorter dwell ends in zeros
+  Eigen::MatrixXd slow;       ///< of the longest: its mean and what changes slowly, orthonormal
+  bool slow_is_left = false;  ///< and nothing else; otherwise all but that
   double run_s() const { return t_s(t_s.size() - 1); }
+  double dwell_s() const { return step_s * static_cast<double>(off_V.rows()); }
+  bool say_enough() const { return t_s.size() >= kFewestDwells && step_s > 0; }
 };
 
-Dwells dwells_of(const MeasurementSet& set, std::size_t axis) {
-  std::vector<const Pose*> poses;
+/// Their times, and zeros.
+Dwells empty_dwells(const MeasurementSet& set) {
+  std::vector<double> t_s;
   std::size_t longest = 0;
+  double steps = 0, spans_s = 0;
   for (const Pose& pose : set.poses) {
     if (pose.count < kFewestSamples) continue;
-    poses.push_back(&pose);
+    const double first_s = set.samples.t_s[pose.first];
     longest = std::max(longest, pose.count);
+    t_s.push_back(first_s);
+    spans_s += set.samples.t_s[pose.first + pose.count - 1] - first_s;
+    steps += static_cast<double>(pose.count - 1);
   }
-  const std::vector<double>& t_s = set.samples.t_s;
-  std::map<std::size_t, Eigen::MatrixXd> slow;
   Dwells dwells;
-  if (poses.empty()) return dwells;
-  dwells.origin_s = t_s[poses.front()->first];
-  dwells.t_s.resize(std::ssize(poses));
-  const auto rows = static_cast<Eigen::Index>(longest);
-  const Eigen::MatrixXd steps_of_longest = step_contrasts(longest);
-  dwells.removed.resize(rows, steps_of_longest.cols() + 1);
-  dwells.removed << steps_of_longest,
-      Eigen::VectorXd::Constant(rows, 1 / std::sqrt(static_cast<double>(longest)));
-  dwells.off_V.setZero(rows, std::ssize(poses));
-  double steps = 0, spans_s = 0;
-  for (Eigen::Index k = 0; k < dwells.t_s.size(); ++k) {
-    const Pose& pose = *poses[static_cast<std::size_t>(k)];
+  if (t_s.empty()) return dwells;
+  dwells.origin_s = t_s.front();
+  dwells.t_s = Eigen::Map<const Eigen::ArrayXd>(t_s.data(), std::ssize(t_s)) - dwells.origin_s;
+  dwells.step_s = spans_s / steps;
+  dwells.samples = steps + static_cast<double>(t_s.size());
+  dwells.off_V.setZero(static_cast<Eigen::Index>(longest), std::ssize(t_s));
+  return dwells;
+}
+
+Eigen::VectorXd constant(Eigen::Index samples) {
+  return Eigen::VectorXd::Constant(samples, 1 / std::sqrt(static_cast<double>(samples)));
+}
+
+/// The course of the dwells without `slow`.
+Dwells courses_of(const MeasurementSet& set, std::size_t axis) {
+  Dwells dwells = empty_dwells(set);
+  std::map<std::size_t, Eigen::MatrixXd> slow;
+  Eigen::Index k = 0;
+  for (const Pose& pose : set.poses) {
+    if (pose.count < kFewestSamples) continue;
     const auto n = static_cast<Eigen::Index>(pose.count);
     const Eigen::Map<const Eigen::VectorXd> u_V(set.samples.u_V[axis].data() + pose.first, n);
     if (!slow.contains(pose.count)) slow.emplace(pose.count, step_contrasts(pose.count));
     const Eigen::MatrixXd& contrasts = slow.at(pose.count);
     Eigen::VectorXd off_V = u_V.array() - u_V.mean();
     off_V -= contrasts * (contrasts.transpose() * off_V);
-    dwells.off_V.col(k).head(n) = off_V;
-    dwells.t_s(k) = t_s[pose.first] - dwells.origin_s;
-    spans_s += t_s[pose.first + pose.count - 1] - t_s[pose.first];
-    steps += static_cast<double>(n - 1);
+    dwells.off_V.col(k++).head(n) = off_V;
   }
-  dwells.step_s = spans_s / steps;
-  dwells.samples = steps + static_cast<double>(poses.size());
+  const Eigen::MatrixXd steps_of_longest =
+      step_contrasts(static_cast<std::size_t>(dwells.off_V.rows()));
+  dwells.slow.resize(steps_of_longest.rows(), steps_of_longest.cols() + 1);
+  dwells.slow << steps_of_longest, constant(dwells.off_V.rows());
+  return dwells;
+}
+
+/// Every dwell at one value, which its mean leaves.
+Dwells constants_of(const MeasurementSet& set, const Eigen::VectorXd& left_V) {
+  Dwells dwells = empty_dwells(set);
+  dwells.slow_is_left = true;
+  Eigen::Index k = 0;
+  for (std::size_t pose = 0; pose < set.poses.size(); ++pose)
+    if (set.poses[pose].count >= kFewestSamples)
+      dwells.off_V.col(k++).head(static_cast<Eigen::Index>(set.poses[pose].count)).array() =
+          left_V(static_cast<Eigen::Index>(pose));
+  dwells.slow = constant(dwells.off_V.rows());
   return dwells;
 }
 
@@ -112,10 +137,11 @@ Eigen::ArrayXd power_in_bands(const Eigen::MatrixXd& columns, Eigen::FFT<double>
   return power;
 }
 
-/// Share of a sine of this frequency that is left when what is slow within a dwell is removed.
+/// Share of a sine of this frequency that is left in them.
 double share_left(const Dwells& dwells, double f_hz) {
-  return 1 - along_columns(dwells.removed, dwells.step_s, f_hz).abs2().sum() /
-                 static_cast<double>(dwells.off_V.rows());
+  const double slow = along_columns(dwells.slow, dwells.step_s, f_hz).abs2().sum() /
+                      static_cast<double>(dwells.off_V.rows());
+  return dwells.slow_is_left ? slow : 1 - slow;
 }
 
 /// Power of the dwells together at a frequency, as large as if nothing had been removed.
@@ -180,15 +206,67 @@ double best_frequency(const Dwells& dwells, double f_hz, double width_hz,
   return best_hz;
 }
 
+/// What the dwells say of a line at one frequency.
+struct Peak {
+  double f_hz = 0;
+  double joint_V2 = 0;  ///< power of the dwells together
+  double apart_V2 = 0;  ///< sum of the powers of each
+};
+Peak peak_at(const Dwells& dwells, double f_hz) {
+  return {f_hz, joint_power(dwells, f_hz),
+          components(dwells, f_hz).abs2().sum() / share_left(dwells, f_hz)};
+}
+
+/// Whether the phases of the dwells prefer one frequency to another beyond doubt.
+bool is_clearly_likelier(const Peak& peak, const Peak& other, Eigen::Index dwells) {
+  constexpr double kClearly = 10;  // of ln L
+  const double noise_V2 = peak.apart_V2 - peak.joint_V2 / static_cast<double>(dwells);
+  return peak.joint_V2 - other.joint_V2 > kClearly * noise_V2;
+}
+
+/// A line is looked for up to this many times the sampling rate.
+constexpr int kRates = 6;
+
+/// The strongest line of which the alias lies within ±width/2 of `f_hz`. Within a dwell all of them
+/// look the same; arrivals that are no whole number of samples apart tell them from each other.
+/// Where none do, the alias stands for them all.
+Peak strongest_alias(const Dwells& dwells, double f_hz, double width_hz,
+                     Eigen::FFT<double>& transform) {
+  const double rate_hz = 1 / dwells.step_s;
+  const auto strongest_near = [&](double near_hz) {
+    return peak_at(dwells, best_frequency(dwells, near_hz, width_hz, transform));
+  };
+  Peak best = strongest_near(f_hz);
+  if (best.f_hz > 0.5 * rate_hz) {
+    const Peak mirrored = peak_at(dwells, rate_hz - best.f_hz);
+    if (!is_clearly_likelier(best, mirrored, dwells.t_s.size())) best = mirrored;
+  }
+  for (int rates = 1; rates <= kRates; ++rates)
+    for (const double side : {-1, 1}) {
+      const Peak other = strongest_near(rates * rate_hz + side * f_hz);
+      if (is_clearly_likelier(other, best, dwells.t_s.size())) best = other;
+    }
+  return best;
+}
+
+/// Unless noise shows one as strong somewhere among so many frequencies.
+std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double frequencies) {
+  if (!(peak.apart_V2 > 0) || frequencies * std::exp(-peak.joint_V2 / peak.apart_V2) > kFalseAlarm)
+    return {};
+  const std::complex<double> sum = components(dwells, peak.f_hz).sum();
+  const double phase =
+      std::arg(sum) + 0.25 * effect::kTurn_rad - effect::kTurn_rad * peak.f_hz * dwells.origin_s;
+  return DwellLine{peak.f_hz, 2 * std::abs(sum) / (share_left(dwells, peak.f_hz) * dwells.samples),
+                   phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad)};
+}
+
 }  // namespace
 
 std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::size_t axis) {
   constexpr std::size_t kStrongest = 3;
-  const Dwells dwells = dwells_of(set, axis);
-  if (dwells.t_s.size() < kFewestDwells || !(dwells.step_s > 0)) return {};
-  const auto longest = static_cast<std::size_t>(dwells.off_V.rows());
-  const double dwell_s = dwells.step_s * static_cast<double>(longest);
-  const double width_hz = 0.5 / dwell_s, nyquist_hz = 0.5 / dwells.step_s;
+  const Dwells dwells = courses_of(set, axis);
+  if (!dwells.say_enough()) return {};
+  const double width_hz = 0.5 / dwells.dwell_s();
 
   // Power at each frequency over that of white noise there, which the removal of what is slow
   // lowers towards the lower end.
@@ -199,32 +277,37 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
   std::vector<Band> bands;
   Eigen::FFT<double> transform;
   const Eigen::ArrayXd power_V2 = power_in_bands(dwells.off_V, transform);
-  const Eigen::ArrayXd removed = power_in_bands(dwells.removed, transform);
+  const Eigen::ArrayXd slow = power_in_bands(dwells.slow, transform);
   for (Eigen::Index k = 3; k < power_V2.size(); ++k)
     bands.push_back({width_hz * static_cast<double>(k),
-                     power_V2(k) / (1 - removed(k) / static_cast<double>(longest))});
+                     power_V2(k) / (1 - slow(k) / static_cast<double>(dwells.off_V.rows()))});
   const std::size_t looked_at = std::min(kStrongest, bands.size());
   std::partial_sort(bands.begin(), bands.begin() + static_cast<std::ptrdiff_t>(looked_at),
                     bands.end(), [](const Band& a, const Band& b) { return a.power > b.power; });
 
-  double best_hz = 0, best_power = 0;
+  Peak best;
   for (std::size_t k = 0; k < looked_at; ++k) {
-    const double f_hz = best_frequency(dwells, bands[k].f_hz, width_hz, transform);
-    const double power = joint_power(dwells, f_hz);
-    if (power <= best_power) continue;
-    best_power = power;
-    best_hz = f_hz;
+    const Peak peak = strongest_alias(dwells, bands[k].f_hz, width_hz, transform);
+    if (peak.joint_V2 > best.joint_V2) best = peak;
   }
-  const double apart_V2 = components(dwells, best_hz).abs2().sum() / share_left(dwells, best_hz);
-  const double looks = static_cast<double>(looked_at) * width_hz * dwells.run_s();
-  if (!(apart_V2 > 0) || looks * std::exp(-best_power / apart_V2) > kFalseAlarm) return {};
-  // What lies beyond half the sampling rate is its own mirror image.
-  if (best_hz > nyquist_hz) best_hz = 2 * nyquist_hz - best_hz;
-  const std::complex<double> sum = components(dwells, best_hz).sum();
-  const double phase =
-      std::arg(sum) + 0.25 * effect::kTurn_rad - effect::kTurn_rad * best_hz * dwells.origin_s;
-  return DwellLine{best_hz, 2 * std::abs(sum) / (share_left(dwells, best_hz) * dwells.samples),
-                   phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad)};
+  const double aliases = 1 + 2 * kRates;
+  return line_of(dwells, best,
+                 aliases * static_cast<double>(looked_at) * width_hz * dwells.run_s());
+}
+
+std::optional<DwellLine> line_between_dwells(const MeasurementSet& set,
+                                             const Eigen::VectorXd& left_V) {
+  constexpr double kPeriods = 1.25;  // in a dwell, beyond which little is left in the mean
+  const Dwells dwells = constants_of(set, left_V);
+  if (!dwells.say_enough()) return {};
+  const double width_hz = kPeriods / dwells.dwell_s();
+  Eigen::FFT<double> transform;
+  const Peak best = strongest_alias(dwells, 0.5 * width_hz, width_hz, transform);
+  // What is slower than two visits is a course of the whole run.
+  const double visits = static_cast<double>(dwells.t_s.size());
+  if (best.f_hz < 0.5 * visits / dwells.run_s()) return {};
+  const double aliases = 1 + 2 * kRates;
+  return line_of(dwells, best, aliases * width_hz * dwells.run_s());
 }
 
 }  // namespace plumbline

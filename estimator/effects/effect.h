@@ -51,7 +51,9 @@ struct TermInput {
   std::size_t axis;
   const std::vector<Eigen::Vector3d>& a_g;  ///< specific force at every visit, geometry included
   double response_g;                        ///< Σ_j K_ij·a_j / K_ii at this visit
-  double output_V;                          ///< U_i0 + Σ_j K_ij·a_j
+  /// What the converter is given: U_i0 + Σ_j K_ij·a_j and the axis's terms that are not the
+  /// converter's own.
+  double output_V;
   double K_V_per_g;                         ///< K_ii
 
   const Visit& at() const { return log.visits[visit]; }
@@ -92,6 +94,8 @@ class Effect {
                         HeadGeometry& head) const;
   /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
   virtual double term_g(const TermInput& input, const double* p) const;
+  /// Sensor: whether it is a function of what the converter is given, all other terms included.
+  virtual bool at_converter() const { return false; }
   /// Whether it changes while the head rests; course_g() or angle_course() says how.
   virtual bool within_dwell() const { return false; }
   /// Sensor: the term at every sample of the visit, g.

@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
@@ -15,8 +17,11 @@ class WarmUp final : public Effect {
     // Slower than the run it is a drift, faster than a few poses it is over before it is seen.
     const double span_s = log.last_s() - log.first_s();
     if (!(span_s > 0)) return {};
+    // Before the first pose all but e⁻⁵ of a still faster one is over, however large it was.
+    const double fastest_s = std::max(span_s / 100, log.first_s() / 5);
+    if (!(fastest_s < span_s / 1.5)) return {};
     std::vector<Hypothesis> starts;
-    for (double tau_s : effect::geometric(span_s / 100, span_s / 1.5, 12)) {
+    for (double tau_s : effect::geometric(fastest_s, span_s / 1.5, 12)) {
       starts.push_back({{effect::kSmallTerm, tau_s}});
     }
     return starts;

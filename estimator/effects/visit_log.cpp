@@ -1,5 +1,6 @@
 #include "estimator/effects/visit_log.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -52,6 +53,18 @@ double quiet_scatter_V(const MeasurementSet& set, std::size_t axis) {
   // Quartile of χ²/dof (Wilson & Hilferty, 1931).
   const double spread = 2 / (9 * (readings - 1));
   return std::sqrt(*quarter / std::pow(1 - spread - 0.674 * std::sqrt(spread), 3));
+}
+
+/// What the 12-parameter model leaves of the means, by plain least squares.
+Eigen::VectorXd left_by_twelve_V(const VisitLog& log, std::size_t axis) {
+  Eigen::MatrixXd A(std::ssize(log.visits), 4);
+  Eigen::VectorXd mean_V(A.rows());
+  for (Eigen::Index k = 0; k < A.rows(); ++k) {
+    const Visit& visit = log.visits[static_cast<std::size_t>(k)];
+    A.row(k) << specific_force_g({visit.delta_rad, visit.h_rad}, log.gamma).transpose(), 1;
+    mean_V(k) = visit.mean_V[axis];
+  }
+  return mean_V - A * A.colPivHouseholderQr().solve(mean_V);
 }
 
 /// White noise before the converter.
@@ -256,6 +269,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
     log.line[i] = line_through_dwells(set, i);
+    if (!log.line[i]) log.line[i] = line_between_dwells(set, left_by_twelve_V(log, i));
   });
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))

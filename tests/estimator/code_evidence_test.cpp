@@ -131,6 +131,21 @@ TEST(CodeEvidence, DwellsThatStepOverCodesProveALatticeOfFewPoints) {
   EXPECT_EQ(dwells_over_codes(sound, 0, twelve_bits), 0U);
 }
 
+TEST(CodeEvidence, NoiseOfSomeCodesStepsOverNone) {
+  // In 50 readings the tails of the noise leave codes out, dwell after dwell.
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> noise(0, 1.7);
+  MeasurementSet set;
+  for (int k = 0; k < 324; ++k) {
+    set.poses.push_back({k, 0, 0, set.samples.u_V[0].size(), 50});
+    for (int m = 0; m < 50; ++m)
+      set.samples.u_V[0].push_back(rounded(
+          -2.5 + kSixteenBits.lsb_V() * (4 * (k % 5) + noise(random)), kSixteenBits.lsb_V()));
+  }
+  EXPECT_LE(dwells_over_codes(set, 0, kSixteenBits), 3U);
+  EXPECT_FALSE(code_faults(set, 0, kSixteenBits).coarser_lattice);
+}
+
 TEST(CodeEvidence, FewCodesOfASoundConverterAreNoLattice) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u_V(-2.6, -2.53);
@@ -226,15 +241,19 @@ TEST(CodeFaults, ASoundConverterHasNone) {
   EXPECT_FALSE(faults.coarser_lattice);
 }
 
-// 200 dwells of 40 samples at 100 Hz with white noise, every 6.4 s as a raster has them.
-MeasurementSet dwells(std::uint64_t seed, double amplitude_V, double f_hz, double phase_rad) {
+// 200 dwells of 40 samples at 100 Hz with white noise, every 6.4 s as a raster has them, or a
+// little more or less.
+MeasurementSet dwells(std::uint64_t seed, double amplitude_V, double f_hz, double phase_rad,
+                      double uneven_s = 0) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise_V(0, 3e-4);
+  std::uniform_real_distribution<double> more_s(0, uneven_s);
   MeasurementSet set;
   for (int k = 0; k < 200; ++k) {
     set.poses.push_back({k, 0, 0, set.samples.u_V[0].size(), 40});
+    const double arrival_s = 6.4 * k + (uneven_s > 0 ? more_s(random) : 0);
     for (int m = 0; m < 40; ++m) {
-      const double t_s = 6.4 * k + 0.01 * m;
+      const double t_s = arrival_s + 0.01 * m;
       set.samples.t_s.push_back(t_s);
       for (auto& u_V : set.samples.u_V)
         u_V.push_back(0.02 * std::sin(0.3 * k) + noise_V(random) +
@@ -256,6 +275,47 @@ TEST(DwellLine, AboveHalfTheSamplingRateIsSeenAtItsAlias) {
   const auto line = line_through_dwells(dwells(2, 2e-4, 59.9, 0.4), 1);
   ASSERT_TRUE(line);
   EXPECT_NEAR(line->f_hz, 40.1, 1e-4);
+}
+
+TEST(DwellLine, AboveHalfTheSamplingRateIsKnownFromUnevenArrivals) {
+  for (const double f_hz : {59.9, 133.7, 249.6, 550.2}) {
+    const auto line = line_through_dwells(dwells(3, 2e-4, f_hz, 0.4, 0.5), 1);
+    ASSERT_TRUE(line) << f_hz;
+    EXPECT_NEAR(line->f_hz, f_hz, 1e-4);
+    EXPECT_NEAR(line->amplitude_V, 2e-4, 2e-5);
+    EXPECT_NEAR(std::remainder(line->phase_rad - 0.4, 2 * std::numbers::pi), 0, 0.2);
+  }
+}
+
+// What the means of those dwells leave when the attitudes are taken out.
+Eigen::VectorXd left_by_attitudes(const MeasurementSet& set) {
+  Eigen::VectorXd left_V(std::ssize(set.poses));
+  for (Eigen::Index k = 0; k < left_V.size(); ++k)
+    left_V(k) = Eigen::Map<const Eigen::VectorXd>(set.samples.u_V[0].data() + 40 * k, 40).mean() -
+                0.02 * std::sin(0.3 * static_cast<double>(k));
+  return left_V;
+}
+
+TEST(DwellLine, ThatHardlyChangesWithinADwellShowsInTheMeans) {
+  const MeasurementSet set = dwells(4, 2e-4, 100.6, 0.9, 0.5);
+  EXPECT_FALSE(line_through_dwells(set, 0));
+  const auto line = line_between_dwells(set, left_by_attitudes(set));
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->f_hz, 100.6, 1e-4);
+  EXPECT_NEAR(line->amplitude_V, 2e-4, 4e-5);
+  EXPECT_NEAR(std::remainder(line->phase_rad - 0.9, 2 * std::numbers::pi), 0, 0.3);
+}
+
+TEST(DwellLine, ACourseOfTheRunIsNoLine) {
+  // Slow waves and drifts are lines at every multiple of the sampling rate, too, where the arrivals
+  // do not tell.
+  for (const double uneven_s : {0.0, 0.5}) {
+    const MeasurementSet set = dwells(5, 0, 0, 0, uneven_s);
+    Eigen::VectorXd left_V = left_by_attitudes(set);
+    for (Eigen::Index k = 0; k < left_V.size(); ++k)
+      left_V(k) += 2e-4 * std::sin(0.05 * static_cast<double>(k)) + 1e-6 * static_cast<double>(k);
+    EXPECT_FALSE(line_between_dwells(set, left_V)) << uneven_s;
+  }
 }
 
 TEST(DwellLine, NoiseHasNone) {

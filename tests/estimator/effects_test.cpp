@@ -380,6 +380,33 @@ TEST(Quantization, IsTheSameInASetThatBeginsAtAnotherCode) {
 }
 
 // What hardly changes over a run would take the place of the 12 parameters.
+TEST(CodeStep, LiesWhereTheConverterIsGivenItWhateverMakesTheVoltage) {
+  const VisitLog log = example_log();
+  EnlargedParameters model = twelve();
+  const std::vector<double> output_V = [&] {
+    const Eigen::VectorXd bare_V = predict_means_V(log, model)[0];
+    return std::vector<double>(bare_V.begin(), bare_V.end());
+  }();
+  constexpr double at_V = -2.58, step_V = 1e-4, rate_V_per_s = 5e-5;
+  const auto add = [&](const char* id, const std::vector<double>& p) {
+    for (const Effect* effect : effect_catalogue())
+      if (effect->id() == id) model.effects.push_back(activate(*effect, 0, {p}));
+  };
+  add("adc.code_step", {step_V, at_V});
+  add("sensor.drift", {rate_V_per_s * 3600 / model.twelve[0](0)});
+  ASSERT_THAT(model.effects, SizeIs(2));
+  const Eigen::VectorXd with_V = predict_means_V(log, model)[0];
+  int moved_over = 0;
+  for (std::size_t k = 0; k < log.visits.size(); ++k) {
+    const double bare_V = output_V[k], given_V = bare_V + rate_V_per_s * log.visits[k].t_mean_s;
+    if (std::abs(given_V - at_V) < 6 * log.input_sd_V[0]) continue;
+    EXPECT_NEAR(with_V(static_cast<Eigen::Index>(k)), given_V + (given_V > at_V ? step_V : -step_V),
+                1e-9);
+    moved_over += (bare_V > at_V) != (given_V > at_V) ? 1 : 0;
+  }
+  EXPECT_GT(moved_over, 3);
+}
+
 TEST(AverageOfThePast, ForgetsWithinTheRunThatIsSearched) {
   const VisitLog log = example_log();
   const double span_s = log.last_s() - log.first_s();
