@@ -56,8 +56,8 @@ struct AxisWork {
   /// measured (RoundingFree::beyond_V2).
   Eigen::VectorXd rounding_V;
   double rounding_V2 = 0;
-  Eigen::VectorXd positioning_V2;
-  Eigen::VectorXd own_V2;  ///< variance that each pose has for itself: positioning and rounding
+  Eigen::VectorXd known_V2;  ///< of each pose, by positioning and by bursts of noise
+  Eigen::VectorXd own_V2;    ///< variance that each pose has for itself: that and rounding
   GeneralisedFit fit;
   Eigen::MatrixXd V;
   ResidualTestResult test;
@@ -138,7 +138,7 @@ Eigen::Matrix4d with_allowance_for_noise(const Experiment& experiment, const Axi
 /// Estimates from the codes where rounding matters.
 void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
   if (!experiment.input.description.adc) return;
-  auto quantized = quantized_axis(experiment.input.run, experiment.A, work.positioning_V2,
+  auto quantized = quantized_axis(experiment.input.run, experiment.A, work.known_V2,
                                   Eigen::VectorXd::Zero(work.y.size()),
                                   scale_of(*experiment.input.description.adc), axis);
   if (!quantized) return;
@@ -176,8 +176,13 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   work.y = mean_V;
   const Eigen::Index n = work.y.size();
   LeastSquaresResult ordinary = solve_least_squares(experiment.A, work.y);
-  work.positioning_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
-  work.own_V2 = work.positioning_V2;
+  work.known_V2 = positioning_variance_V2(experiment, ordinary.x.head<3>());
+  // Edges between codes that are missing or doubled make dwells noisy, too.
+  if (rounded_as_declared(experiment.input, axis)) {
+    const auto& adc = experiment.input.description.adc;
+    work.known_V2 += burst_variance_V2(experiment.input.run, axis, adc ? adc->lsb_V() : 0);
+  }
+  work.own_V2 = work.known_V2;
   work.record = identified;
   RoundingFree free;
   if (experiment.input.description.adc && experiment.white_V[axis] >= 0) {
@@ -197,8 +202,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
     if (free.coarse && n > 4) {
       work.record = record_beside_rounding(identified, *experiment.input.description.adc,
                                            experiment.white_V[axis]);
-      const NoisePool pool(experiment.processes, work.record,
-                           work.positioning_V2 + free.variance_V2);
+      const NoisePool pool(experiment.processes, work.record, work.known_V2 + free.variance_V2);
       const Eigen::MatrixXd V = pool.pool(work.y, experiment.A).covariance;
       free_means(experiment.A * ordinary.x +
                  expected_from_others(V, work.y - experiment.A * ordinary.x));
@@ -327,8 +331,8 @@ UncertaintyReport uncertainty_of(const CalibrationInput& input, const PerAxis<Ax
     a.gain = w.fit.gain;
     // Rounding that was estimated from the codes is part of the noise there.
     a.rounding_V2 = w.quantized ? Eigen::VectorXd(Eigen::VectorXd::Zero(w.y.size()))
-                                : Eigen::VectorXd(w.own_V2 - w.positioning_V2);
-    const Eigen::VectorXd own_V2 = a.rounding_V2 + w.positioning_V2;
+                                : Eigen::VectorXd(w.own_V2 - w.known_V2);
+    const Eigen::VectorXd own_V2 = a.rounding_V2 + w.known_V2;
     a.noise = w.fit.estimate.covariance - a.gain * own_V2.asDiagonal() * a.gain.transpose();
   }
   return propagate_uncertainty({input.run.poses, input.description, axes}, seed);
@@ -336,8 +340,11 @@ UncertaintyReport uncertainty_of(const CalibrationInput& input, const PerAxis<Ax
 
 }  // namespace
 
-Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& options) {
-  assert(input.run.has_angles && !input.run.poses.empty());
+Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& options) {
+  assert(given.run.has_angles && !given.run.poses.empty());
+  RunDescription description = given.description;
+  if (description.adc) description.adc = aligned_with(given.run.samples, *description.adc);
+  const CalibrationInput input{given.run, given.static_record, description};
   Experiment experiment{input, pose_means(input.run), {}, {}, {}, {}, {}};
   experiment.A = design_matrix(experiment.poses, input.description.gravity);
 
@@ -433,7 +440,7 @@ Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& o
     ExplainInput explain_input{
         input, experiment.poses, experiment.windows, result.noise, {}, experiment.processes, {}};
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      explain_input.positioning_V2[axis] = work[axis].positioning_V2;
+      explain_input.known_V2[axis] = work[axis].known_V2;
       explain_input.pooled[axis] = work[axis].pooled;
     }
     if (const auto worst = explain(explain_input, options, result)) {

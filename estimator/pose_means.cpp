@@ -1,8 +1,10 @@
 #include "estimator/pose_means.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <span>
 
 namespace plumbline {
@@ -73,6 +75,58 @@ double white_scatter_V(const MeasurementSet& set, std::size_t axis) {
     }
   }
   return count == 0 ? 0 : std::sqrt(sum / (2 * static_cast<double>(count)));
+}
+
+namespace {
+
+/// Of the differences of neighbouring readings within a pose.
+struct Differences {
+  double mean_square_V2 = 0;
+  double typical_V = 0;  ///< mean size of the smaller three quarters
+};
+Differences differences_of(const std::vector<double>& u_V, const Pose& pose) {
+  std::vector<double> size_V;
+  Differences found;
+  for (std::size_t k = pose.first + 1; k < pose.first + pose.count; ++k) {
+    size_V.push_back(std::abs(u_V[k] - u_V[k - 1]));
+    found.mean_square_V2 += size_V.back() * size_V.back();
+  }
+  found.mean_square_V2 /= static_cast<double>(size_V.size());
+  const auto smaller = size_V.begin() + 3 * std::ssize(size_V) / 4;
+  std::nth_element(size_V.begin(), smaller, size_V.end());
+  found.typical_V =
+      std::accumulate(size_V.begin(), smaller, 0.0) / static_cast<double>(smaller - size_V.begin());
+  return found;
+}
+
+}  // namespace
+
+Eigen::VectorXd burst_variance_V2(const MeasurementSet& set, std::size_t axis, double step_V) {
+  constexpr std::size_t kFewestReadings = 16;
+  constexpr double kClearly = 2;  // times the others' noise
+  constexpr double kSeen = 0.6;   // of a step, below which codes hide noise
+  const auto n = std::ssize(set.poses);
+  Eigen::VectorXd variance_V2 = Eigen::VectorXd::Zero(n);
+  const auto is_short = [](const Pose& pose) { return pose.count < kFewestReadings; };
+  if (n == 0 || std::any_of(set.poses.begin(), set.poses.end(), is_short)) return variance_V2;
+  std::vector<Differences> dwells;
+  for (const Pose& pose : set.poses) dwells.push_back(differences_of(set.samples.u_V[axis], pose));
+  const auto median = [&](double Differences::*value) {
+    std::vector<double> values;
+    for (const Differences& dwell : dwells) values.push_back(dwell.*value);
+    std::nth_element(values.begin(), values.begin() + n / 2, values.end());
+    return values[static_cast<std::size_t>(n / 2)];
+  };
+  const double usual_V = median(&Differences::typical_V);
+  const double usual_V2 = median(&Differences::mean_square_V2);
+  if (std::sqrt(usual_V2 / 2) < kSeen * step_V) return variance_V2;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Differences& dwell = dwells[static_cast<std::size_t>(k)];
+    if (dwell.typical_V > kClearly * usual_V)
+      variance_V2(k) = (dwell.mean_square_V2 - usual_V2) / 2 /
+                       static_cast<double>(set.poses[static_cast<std::size_t>(k)].count);
+  }
+  return variance_V2;
 }
 
 }  // namespace plumbline

@@ -28,4 +28,11 @@ Eigen::VectorXd mean_voltages(const std::vector<PoseMean>& poses, std::size_t ax
 /// slow drifts do not enter, V; 0 when no pose has two samples.
 double white_scatter_V(const MeasurementSet& set, std::size_t axis);
 
+/// Dwells that are clearly noisier than most, as when somebody walks past: variance that their
+/// means have beyond that of the others, V², zero for all others. Told by the typical difference of
+/// neighbouring readings, which neither a course within the dwell nor a single jump changes.
+/// Nothing where a dwell has fewer than 16 readings or the noise stays within `step_V`, between
+/// the codes.
+Eigen::VectorXd burst_variance_V2(const MeasurementSet& set, std::size_t axis, double step_V);
+
 }  // namespace plumbline

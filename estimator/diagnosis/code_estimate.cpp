@@ -93,7 +93,7 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
                                           : found.fit.parameters;
     const Eigen::VectorXd known_V = predict_means_V(log, before)[axis] - A * before.twelve[axis];
     const auto quantized =
-        quantized_axis(run, A, input.positioning_V2[axis], known_V, rounded->scale, axis);
+        quantized_axis(run, A, input.known_V2[axis], known_V, rounded->scale, axis);
     if (!quantized) continue;
     any = true;
     // How far the poses scatter beyond their codes is left to the noise, which knows of slow parts.

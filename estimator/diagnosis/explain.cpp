@@ -282,7 +282,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const Observations observed = observe(input.input.run, log);
   EnlargedParameters start;
   for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
-  const SearchInput search{log,   observed,     input.noise, input.processes, input.positioning_V2,
+  const SearchInput search{log,   observed,     input.noise, input.processes, input.known_V2,
                            start, &input.pooled};
   Searched searched = search_readings(input, search, options);
   SearchResult& found = searched.found;
@@ -294,8 +294,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
 
   // What is estimated from other readings has a log of its own.
   const VisitLog& estimated_log = searched.log ? *searched.log : log;
-  const SearchInput estimated_search{estimated_log,         observed, input.noise,  input.processes,
-                                     search.positioning_V2, start,    &input.pooled};
+  const SearchInput estimated_search{estimated_log,   observed, input.noise,  input.processes,
+                                     search.known_V2, start,    &input.pooled};
   const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
   const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};

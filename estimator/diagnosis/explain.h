@@ -17,7 +17,7 @@ struct ExplainInput {
   const std::vector<PoseMean>& poses;
   const std::vector<SampleWindow>& windows;
   const PerAxis<NoiseModel>& noise;         ///< as identified
-  PerAxis<Eigen::VectorXd> positioning_V2;  ///< variance of each pose by the head's positioning
+  PerAxis<Eigen::VectorXd> known_V2;  ///< variance of each pose by the head's positioning
   const NoiseProcesses& processes;          ///< of the windows
   PerAxis<PooledNoise> pooled;              ///< of the pose means beside the 12 parameters
 };

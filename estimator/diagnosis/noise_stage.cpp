@@ -157,7 +157,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     };
     if (freed) {
       mean_V = before.freed->observed.mean_V[i];
-      free = {mean_V, before.freed->own_V2[i] - input.positioning_V2[i], true,
+      free = {mean_V, before.freed->own_V2[i] - input.known_V2[i], true,
               before.freed->beyond_V2[i]};
     } else {
       free_means(predicted[i]);
@@ -179,7 +179,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
                           before.start != nullptr ? &(*before.start)[i].power : nullptr);
       };
       if (left_open_V2[i].maxCoeff() > 0) stage.crossing_V2[i] = left_open_V2[i];
-      const Eigen::VectorXd own_V2 = input.positioning_V2[i] + free.variance_V2 + left_open_V2[i];
+      const Eigen::VectorXd own_V2 = input.known_V2[i] + free.variance_V2 + left_open_V2[i];
       stage.noise[i] = pool(own_V2);
       // Where the response is nothing but steps, only the visits near their edges say anything.
       if (has_effect_on(parameters, i) && !input.log.codes[i].coarser_lattice) {
@@ -201,7 +201,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     }
     stage.coarse[i] = free.coarse;
     stage.beyond_V2[i] = free.beyond_V2;
-    stage.own_V2[i] = input.positioning_V2[i] + free.variance_V2;
+    stage.own_V2[i] = input.known_V2[i] + free.variance_V2;
     stage.whitening.set(i, stage.noise[i].covariance);
   });
   return stage;

@@ -36,7 +36,7 @@ struct SearchInput {
   const Observations& observed;  ///< as measured
   const PerAxis<NoiseModel>& noise;
   const NoiseProcesses& processes;                 ///< at the n visits
-  const PerAxis<Eigen::VectorXd>& positioning_V2;  ///< n known variances, V²
+  const PerAxis<Eigen::VectorXd>& known_V2;  ///< n known variances, V²
   EnlargedParameters start;                        ///< the 12 parameters, no effects
   /// Noise beside the 12 parameters when it is known already; null: the search finds it.
   const PerAxis<PooledNoise>* pooled = nullptr;

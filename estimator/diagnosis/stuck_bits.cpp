@@ -306,7 +306,7 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
     std::erase_if(result.candidates.candidates, [&](const Candidate& candidate) {
       return candidate.effect == &stuck_bit && bits.on(candidate.axis);
     });
-    PerAxis<Eigen::VectorXd> known_V2 = input.positioning_V2;
+    PerAxis<Eigen::VectorXd> known_V2 = input.known_V2;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       if (bits.on(axis)) known_V2[axis] += bits.extra_V2(axis);
     without =

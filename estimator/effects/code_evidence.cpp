@@ -4,8 +4,10 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <utility>
 
 #include "estimator/noise/chi_squared.h"
@@ -37,6 +39,26 @@ std::optional<StuckBit> unchanging(const std::vector<std::int64_t>& codes, int b
 }
 
 }  // namespace
+
+Adc aligned_with(const SampleTable& readings, const Adc& declared) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  constexpr double kOneShift = 0.99;  // of the mean length, were all the same
+  constexpr double kNoShift = 0.05;   // of a step
+  constexpr double kHighest = 0.75;   // of a step: the middle of a code is above its lower end
+  std::complex<double> sum = 0;
+  std::size_t count = 0;
+  for (const std::vector<double>& u_V : readings.u_V) {
+    for (const double u : u_V)
+      sum += std::polar(1.0, kTurn * std::remainder((u - declared.min_V) / declared.lsb_V(), 1));
+    count += u_V.size();
+  }
+  double shift = std::arg(sum) / kTurn;
+  if (std::abs(sum) < kOneShift * static_cast<double>(count) || std::abs(shift) < kNoShift)
+    return declared;
+  if (shift < kHighest - 1) shift += 1;
+  const double shift_V = shift * declared.lsb_V();
+  return {declared.bits, declared.min_V + shift_V, declared.max_V + shift_V};
+}
 
 std::vector<std::int64_t> codes_seen(std::span<const double> u_V, const Adc& adc) {
   std::vector<std::int64_t> codes = codes_of(u_V, adc);

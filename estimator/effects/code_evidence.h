@@ -12,6 +12,10 @@
 
 namespace plumbline {
 
+/// The converter with its span moved by part of a step, so that readings lie at whole codes: some
+/// state the middle of a code, some an end of it. As declared where no one shift fits nearly all.
+Adc aligned_with(const SampleTable& readings, const Adc& declared);
+
 /// The different codes among the readings, ascending, counted from the lower end of the span; the
 /// functions below take them.
 std::vector<std::int64_t> codes_seen(std::span<const double> u_V, const Adc& adc);

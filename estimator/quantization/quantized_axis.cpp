@@ -33,7 +33,7 @@ double scatter_of_readings(const std::vector<CodeCounts>& codes, const Eigen::Ma
 }  // namespace
 
 std::optional<QuantizedAxis> quantized_axis(const MeasurementSet& run, const Eigen::MatrixXd& A,
-                                            const Eigen::VectorXd& positioning_V2,
+                                            const Eigen::VectorXd& known_V2,
                                             const Eigen::VectorXd& known_V, const CodeScale& scale,
                                             std::size_t axis) {
   if (A.rows() < kFewestPoses) return std::nullopt;
@@ -41,7 +41,7 @@ std::optional<QuantizedAxis> quantized_axis(const MeasurementSet& run, const Eig
   const double step_V = scale.step_V;
   const Eigen::VectorXd known = known_V / step_V;
   if (!codes || scatter_of_readings(*codes, A, known) > kStepsThatSmooth) return std::nullopt;
-  const IntervalFit fit = fit_intervals(A, *codes, positioning_V2 / (step_V * step_V), known);
+  const IntervalFit fit = fit_intervals(A, *codes, known_V2 / (step_V * step_V), known);
   if (!fit.converged) return std::nullopt;
 
   QuantizedAxis result;

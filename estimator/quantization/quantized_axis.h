@@ -23,10 +23,10 @@ struct QuantizedAxis {
 
 /// Nothing when the noise is large enough to smooth the steps (readings scatter by more than 0.9
 /// steps: least squares is then as good), when the voltages are no codes, when there are fewer than
-/// 12 poses or when the estimation does not converge. A: n × 4; positioning_V2: n; known_V: n, what
+/// 12 poses or when the estimation does not converge. A: n × 4; known_V2: n; known_V: n, what
 /// the output is known to be beside A·x.
 std::optional<QuantizedAxis> quantized_axis(const MeasurementSet& run, const Eigen::MatrixXd& A,
-                                            const Eigen::VectorXd& positioning_V2,
+                                            const Eigen::VectorXd& known_V2,
                                             const Eigen::VectorXd& known_V, const CodeScale& scale,
                                             std::size_t axis);
 

@@ -9,6 +9,8 @@
 #include <random>
 
 #include "estimator/effects/dwell_line.h"
+#include "estimator/effects/visit_log.h"
+#include "estimator/pose_means.h"
 
 namespace plumbline {
 namespace {
@@ -146,6 +148,32 @@ TEST(CodeEvidence, NoiseOfSomeCodesStepsOverNone) {
   EXPECT_FALSE(code_faults(set, 0, kSixteenBits).coarser_lattice);
 }
 
+TEST(CodeEvidence, ReadingsMayStateAnyPlaceOfTheirCode) {
+  for (const double place : {0.0, 0.37, 0.5}) {
+    std::mt19937_64 random(9);
+    std::uniform_int_distribution<int> code(30000, 32000);
+    SampleTable readings;
+    for (int k = 0; k < 3000; ++k)
+      for (auto& u_V : readings.u_V)
+        // Text of nine decimals.
+        u_V.push_back(1e-9 *
+                      std::round(1e9 * (-5 + kSixteenBits.lsb_V() * (code(random) + place))));
+    const Adc aligned = aligned_with(readings, kSixteenBits);
+    EXPECT_NEAR(aligned.min_V, -5 + place * kSixteenBits.lsb_V(), 1e-7);
+    EXPECT_NEAR(aligned.lsb_V(), kSixteenBits.lsb_V(), 1e-12);
+    EXPECT_EQ(aligned_with(readings, aligned).min_V, aligned.min_V);
+    readings.u_V[1].back() = -2.5;  // one of them does not matter
+    EXPECT_NEAR(aligned_with(readings, kSixteenBits).min_V, aligned.min_V, 1e-7);
+  }
+}
+
+TEST(CodeEvidence, ReadingsOfAnotherConverterLeaveItAsDeclared) {
+  SampleTable readings;
+  for (int k = 0; k < 3000; ++k)
+    for (auto& u_V : readings.u_V) u_V.push_back(-2.5 + 1.1e-4 * k);
+  EXPECT_EQ(aligned_with(readings, kSixteenBits).min_V, kSixteenBits.min_V);
+}
+
 TEST(CodeEvidence, FewCodesOfASoundConverterAreNoLattice) {
   std::mt19937_64 random(5);
   std::uniform_real_distribution<double> u_V(-2.6, -2.53);
@@ -239,6 +267,56 @@ TEST(CodeFaults, ASoundConverterHasNone) {
       code_faults(poses_with([](std::int64_t code) { return code; }), 0, kTwelveBits);
   EXPECT_TRUE(faults.stuck_bits.empty());
   EXPECT_FALSE(faults.coarser_lattice);
+}
+
+// 200 dwells of 40 samples of white noise.
+MeasurementSet dwells_of_noise(std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise_V(0, 3e-4);
+  MeasurementSet set;
+  for (int k = 0; k < 200; ++k) {
+    set.poses.push_back({k, 0, 0, set.samples.u_V[0].size(), 40});
+    for (int m = 0; m < 40; ++m)
+      for (auto& u_V : set.samples.u_V) u_V.push_back(noise_V(random));
+  }
+  return set;
+}
+
+TEST(CodeFaults, ABitThatNothingMissesIsNotStuck) {
+  // z reads the same all around: three rings are three readings, here with one bit alike.
+  MeasurementSet set;
+  std::mt19937_64 random(10);
+  std::normal_distribution<double> noise(0, 2);
+  RunDescription description;
+  description.adc = kSixteenBits;
+  for (int k = 0; k < 108; ++k) {
+    const double h_deg = 40.0 * (k / 36);
+    set.poses.push_back({k, 10.0 * (k % 36), h_deg, set.samples.t_s.size(), 20});
+    for (int m = 0; m < 20; ++m) {
+      set.samples.t_s.push_back(5.0 * k + 0.01 * m);
+      for (auto& u_V : set.samples.u_V) {
+        const double code = 29800 + 4500 * std::sin(h_deg * std::numbers::pi / 180);
+        u_V.push_back(-5 + kSixteenBits.lsb_V() * std::round(code + noise(random)));
+      }
+    }
+  }
+  EXPECT_FALSE(code_faults(set, 2, kSixteenBits).stuck_bits.empty());
+  EXPECT_TRUE(make_visit_log(set, description).codes[2].stuck_bits.empty());
+}
+
+TEST(PoseMeans, BurstsOfNoiseMakeAMeanLessCertain) {
+  MeasurementSet set = dwells_of_noise(11);
+  const Pose& loud = set.poses[17];
+  for (std::size_t k = loud.first; k < loud.first + loud.count; ++k) set.samples.u_V[0][k] *= 4;
+  // A single jump and a course within the dwell are no burst.
+  set.samples.u_V[0][set.poses[30].first + 5] += 0.1;
+  for (std::size_t k = 0; k < 40; ++k)
+    set.samples.u_V[0][set.poses[40].first + k] += 1e-4 * static_cast<double>(k);
+  const Eigen::VectorXd variance_V2 = burst_variance_V2(set, 0, 0);
+  EXPECT_EQ((variance_V2.array() > 0).count(), 1);
+  EXPECT_NEAR(variance_V2(17), 15 * 9e-8 / 40, 0.5 * 15 * 9e-8 / 40);
+  EXPECT_TRUE(burst_variance_V2(set, 1, 0).isZero());
+  EXPECT_TRUE(burst_variance_V2(set, 0, 1e-3).isZero());  // noise between two codes
 }
 
 // 200 dwells of 40 samples at 100 Hz with white noise, every 6.4 s as a raster has them, or a
