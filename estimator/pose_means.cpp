@@ -113,6 +113,7 @@ Eigen::VectorXd burst_variance_V2(const MeasurementSet& set, std::size_t axis, d
   for (const Pose& pose : set.poses) dwells.push_back(differences_of(set.samples.u_V[axis], pose));
   const auto median = [&](double Differences::*value) {
     std::vector<double> values;
+    values.reserve(dwells.size());
     for (const Differences& dwell : dwells) values.push_back(dwell.*value);
     std::nth_element(values.begin(), values.begin() + n / 2, values.end());
     return values[static_cast<std::size_t>(n / 2)];

@@ -21,7 +21,7 @@ class MainsPickup final : public Effect {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     const auto& line = log.line[axis];
-    if (!line) return {};
+    if (!line || !line->steady) return {};
     // The fit keeps the sign of a shape: from half a turn up no phase comes near zero.
     const double phase_deg = line->phase_rad / effect::kRadPerDeg;
     return {{{effect::kSmallTerm, line->f_hz, phase_deg < 180 ? phase_deg + 360 : phase_deg}}};

@@ -249,6 +249,25 @@ Peak strongest_alias(const Dwells& dwells, double f_hz, double width_hz,
   return best;
 }
 
+/// Whether a line is as strong in the second half of the dwells as in the first: what dies away
+/// there was begun by the move before, and has one phase in all dwells where they begin at even
+/// times.
+bool is_steady(const Dwells& dwells, const Peak& peak) {
+  constexpr double kClearly = 6;  // standard deviations
+  constexpr double kMuch = 1.4;   // as a ratio
+  const Eigen::Index half = dwells.off_V.rows() / 2;
+  const Eigen::ArrayXcd begins = turning(peak.f_hz, dwells.t_s);
+  const auto strength = [&](const Eigen::MatrixXd& part) {
+    const Eigen::ArrayXcd parts = along_columns(part, dwells.step_s, peak.f_hz) * begins;
+    const double joint = std::abs(parts.sum());
+    const double spread = parts.abs2().sum() - joint * joint / static_cast<double>(parts.size());
+    return std::pair{joint, std::sqrt(std::max(0.0, spread))};
+  };
+  const auto [first, first_sd] = strength(dwells.off_V.topRows(half));
+  const auto [second, second_sd] = strength(dwells.off_V.middleRows(half, half));
+  return first < kMuch * second || first - second < kClearly * std::hypot(first_sd, second_sd);
+}
+
 /// Unless noise shows one as strong somewhere among so many frequencies.
 std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double frequencies) {
   if (!(peak.apart_V2 > 0) || frequencies * std::exp(-peak.joint_V2 / peak.apart_V2) > kFalseAlarm)
@@ -257,7 +276,8 @@ std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double 
   const double phase =
       std::arg(sum) + 0.25 * effect::kTurn_rad - effect::kTurn_rad * peak.f_hz * dwells.origin_s;
   return DwellLine{peak.f_hz, 2 * std::abs(sum) / (share_left(dwells, peak.f_hz) * dwells.samples),
-                   phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad)};
+                   phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad),
+                   dwells.slow_is_left || is_steady(dwells, peak)};
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -85,6 +86,37 @@ class HarmonicSeries final : public DrivenTerm {
   }
 
   int order_;
+};
+
+class Harmonic final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  bool repeats() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"n", "", ParameterRole::index},
+            {"c", target().unit(), ParameterRole::amplitude},
+            {"s", target().unit(), ParameterRole::amplitude}};
+  }
+  // Positions at equal distances do not tell n from their number less n.
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr double kNear_rad = 1e-3;
+    constexpr std::size_t kLowest = 3, kHighest = 17;
+    std::set<long> positions;
+    for (const double value : variable().value[0])
+      positions.insert(std::lround(std::remainder(value, effect::kTurn_rad) / kNear_rad));
+    const double size = target().typical_size();
+    std::vector<Hypothesis> starts;
+    for (std::size_t n = kLowest; n <= kHighest && 2 * n < positions.size(); ++n)
+      starts.push_back({{static_cast<double>(n), size, size}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "harmonic"; }
+  double at(double value, const double* p) const override {
+    return p[1] * std::cos(p[0] * value) + p[2] * std::sin(p[0] * value);
+  }
 };
 
 class Wave final : public DrivenTerm {
@@ -246,6 +278,9 @@ std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& targe
 }
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order) {
   return std::make_unique<HarmonicSeries>(std::move(driver), target, order);
+}
+std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target) {
+  return std::make_unique<Harmonic>(std::move(driver), target);
 }
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest) {

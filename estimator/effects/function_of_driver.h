@@ -39,6 +39,9 @@ struct Cycles {
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree);
 /// Harmonics of order 1 … `order` of an angle.
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order);
+/// One harmonic of an angle, the third or a higher one, as far as the positions tell it from lower
+/// ones.
+std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target);
 /// One wave of unknown period, none shorter than `shortest`.
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest = 0);

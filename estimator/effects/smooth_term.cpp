@@ -136,6 +136,8 @@ class TermList {
     if (driver->in_the_twelve) add_of_component(driver);
     if (driver->angle) add_of_angle(driver);
     if (driver->name == "h_deg") add_harmonics_of_h(driver);
+    if (driver->name == "delta_deg")
+      for (const Target& target : {kBias, kScale}) add(harmonic(driver, target));
   }
   void add_of_column(const DriverPointer& driver) {
     columns_.push_back(driver);

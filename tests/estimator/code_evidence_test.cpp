@@ -384,6 +384,20 @@ TEST(DwellLine, ThatHardlyChangesWithinADwellShowsInTheMeans) {
   EXPECT_NEAR(std::remainder(line->phase_rad - 0.9, 2 * std::numbers::pi), 0, 0.3);
 }
 
+TEST(DwellLine, WhatDiesAwayInEveryDwellIsNotSteady) {
+  MeasurementSet set = dwells(6, 2e-4, 23.371, 1.2);
+  EXPECT_TRUE(line_through_dwells(set, 0)->steady);
+  for (const Pose& pose : set.poses)
+    for (std::size_t m = 0; m < pose.count; ++m) {
+      const double t_s = 0.01 * static_cast<double>(m);
+      set.samples.u_V[1][pose.first + m] +=
+          2e-3 * std::exp(-t_s / 0.1) * std::sin(2 * std::numbers::pi * 18 * t_s);
+    }
+  const auto line = line_through_dwells(set, 1);
+  ASSERT_TRUE(line);
+  EXPECT_FALSE(line->steady);
+}
+
 TEST(DwellLine, ACourseOfTheRunIsNoLine) {
   // Slow waves and drifts are lines at every multiple of the sampling rate, too, where the arrivals
   // do not tell.

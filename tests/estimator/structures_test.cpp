@@ -78,6 +78,16 @@ TEST(Structure, ProductsOfThreeComponentsAreNotDrivenByTheTime) {
                          "the component of the axis after the next"});
 }
 
+// As series of lower order, steps and waves it left remnants, each with a finding of its own.
+TEST(Structure, AHighHarmonicOfTheSpindleIsOne) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) {
+    return 3e-4 * std::sin(7 * std::atan2(-a_g[1], a_g[0]) + 0.4);
+  };
+  expect_only_structure(options, {"delta_deg", "bias", "harmonic"});
+}
+
 // The way of the last turn, kept while only h moves.
 TEST(Structure, WhatDependsOnTheDirectionOfTheTurnIsNoPolynomialOfIt) {
   SyntheticOptions options;
