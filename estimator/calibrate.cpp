@@ -231,9 +231,10 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   work.noise = in_filter_terms(work.record, experiment.processes, work.pooled, span_s);
   work.V = NoisePool(experiment.processes, work.record, work.own_V2).covariance(work.pooled.power);
   if (work.pooled.covariance.size() == 0) work.pooled.covariance = work.V;
-  if (const auto fit = fit_generalised(experiment.A, work.y, work.V)) {
+  const auto fit = known ? fit_generalised(experiment.A, work.y, work.V) : std::nullopt;
+  if (fit) {
     work.fit = *fit;
-    work.noise_known = known;
+    work.noise_known = true;
     work.fit.estimate.covariance =
         with_allowance_for_noise(experiment, work, work.V, fit->estimate.covariance);
     use_codes(experiment, axis, work);

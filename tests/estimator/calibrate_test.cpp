@@ -193,7 +193,11 @@ TEST(Calibrate, OneReadingAPose) {
   const Calibration alone = calibrate({data.run, nullptr, data.description}, {});
   EXPECT_EQ(alone.diagnosis.verdict, Verdict::undetermined);
   EXPECT_THAT(alone.diagnosis.reason, HasSubstr("no noise could be identified"));
-  EXPECT_TRUE(alone.estimates.batch_ls[0].value.allFinite());
+  // Then the residual says how sure the parameters are.
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double u = std::sqrt(result.estimates.batch_ls[i].covariance(0, 0));
+    EXPECT_NEAR(std::sqrt(alone.estimates.batch_ls[i].covariance(0, 0)), u, 0.3 * u);
+  }
 }
 
 TEST(Calibrate, DecidesAgainstTheLimit) {
