@@ -103,8 +103,7 @@ Differences differences_of(const std::vector<double>& u_V, const Pose& pose) {
 
 Eigen::VectorXd burst_variance_V2(const MeasurementSet& set, std::size_t axis, double step_V) {
   constexpr std::size_t kFewestReadings = 16;
-  constexpr double kClearly = 2;  // times the others' noise
-  constexpr double kSeen = 0.6;   // of a step, below which codes hide noise
+  constexpr double kSeen = 0.6;  // of a step, below which codes hide noise
   const auto n = std::ssize(set.poses);
   Eigen::VectorXd variance_V2 = Eigen::VectorXd::Zero(n);
   const auto is_short = [](const Pose& pose) { return pose.count < kFewestReadings; };
@@ -123,9 +122,12 @@ Eigen::VectorXd burst_variance_V2(const MeasurementSet& set, std::size_t axis, d
   if (std::sqrt(usual_V2 / 2) < kSeen * step_V) return variance_V2;
   for (Eigen::Index k = 0; k < n; ++k) {
     const Differences& dwell = dwells[static_cast<std::size_t>(k)];
-    if (dwell.typical_V > kClearly * usual_V)
-      variance_V2(k) = (dwell.mean_square_V2 - usual_V2) / 2 /
-                       static_cast<double>(set.poses[static_cast<std::size_t>(k)].count);
+    const auto readings = static_cast<double>(set.poses[static_cast<std::size_t>(k)].count);
+    // Five standard deviations of what chance does to so many; a code's edge near by does some,
+    // too.
+    const double clearly = std::max(1.5, 1 + 5 / std::sqrt(readings));
+    if (dwell.typical_V > clearly * usual_V)
+      variance_V2(k) = (dwell.mean_square_V2 - usual_V2) / 2 / readings;
   }
   return variance_V2;
 }
