@@ -59,7 +59,6 @@ bool is_nothing_but_steps(const VisitLog& log, std::size_t axis) {
 
 CandidateList all_candidates(const VisitLog& log,
                              const std::vector<std::shared_ptr<const Effect>>& own) {
-  constexpr double kUnnamed = 7;
   CandidateList list;
   for (const Effect* effect : effect_catalogue()) add_candidates(list, log, *effect);
   if (log.is_coarse()) {
@@ -73,7 +72,7 @@ CandidateList all_candidates(const VisitLog& log,
   for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
     if (imitates_proven_rounding(log, *term)) continue;
     list.owned.push_back(std::move(term));
-    add_candidates(list, log, *list.owned.back(), kUnnamed);
+    add_candidates(list, log, *list.owned.back(), kHandicapOfUnnamed);
   }
   std::erase_if(list.candidates, [&](const Candidate& candidate) {
     return !candidate.has_name() && candidate.effect->subject() == Subject::sensor &&

@@ -10,6 +10,10 @@
 
 namespace plumbline {
 
+/// A term without a name must be e^7 times as likely as one with a name: a polynomial can imitate
+/// much.
+inline constexpr double kHandicapOfUnnamed = 7;
+
 /// One hypothesis of one effect on one axis (or the head).
 struct Candidate {
   const Effect* effect = nullptr;
@@ -37,8 +41,7 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
                     double handicap = 0);
 
 /// The catalogue, every recorded column, smooth terms in every variable, and the user's `own`
-/// effects. A term without a name must be e^7 times as likely as one with a name: a polynomial can
-/// imitate much.
+/// effects.
 CandidateList all_candidates(const VisitLog& log,
                              const std::vector<std::shared_ptr<const Effect>>& own = {});
 

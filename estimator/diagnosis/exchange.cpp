@@ -38,7 +38,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     const EnlargedFit with =
         model.fit_with(gains, index, candidate, first_order(static_cast<Eigen::Index>(index)));
     if (!with.determined) continue;
-    const double cost = with.chi2 + model.price(index);
+    const double cost = with.chi2 + model.price_in(with, index);
     if (!(cost < model.stage().fit.chi2 + spent - kClearly)) continue;
     const double p = model.p_of(model.log_p_of(index, without, with, gains.dof(index)));
     if (p <= model.options().false_alarm) exchanges.push_back({index, p, with.parameters});
@@ -157,7 +157,7 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
   while (fit.determined && names.size() < most) {
     std::optional<Next> next = likeliest_beside(model, named, fit);
     if (!next) break;
-    price += model.price(next->entry.candidate);
+    price += model.price_in(next->fit, next->entry.candidate);
     names.push_back(std::move(next->entry));
     fit = std::move(next->fit);
     if (fit.chi2 + price >= least_cost) continue;

@@ -13,6 +13,31 @@ namespace plumbline {
 
 namespace {
 
+constexpr double kPerAmplitude = 7;  // about 2·ln of the number of poses
+
+/// Whether the time constant of what changes within the dwell is not known to be finite.
+bool lasts(const EnlargedFit& fit, std::size_t effect) {
+  const ActiveEffect& active = fit.parameters.effects[effect];
+  if (!active.effect->within_dwell()) return false;
+  Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
+  for (std::size_t e = 0; e < effect; ++e) row += fit.parameters.effects[e].free_count();
+  const auto infos = active.effect->parameters();
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    if (!active.free[k]) continue;
+    if (infos[k].role == ParameterRole::shape && infos[k].unit == "s" &&
+        fit.covariance(row, row) > active.p[k] * active.p[k])
+      return true;
+    ++row;
+  }
+  return false;
+}
+
+/// Of a transient that lasts: it has no more right to a name than what has none, and a time
+/// constant that says nothing.
+double surcharge(const EnlargedFit& fit, std::size_t effect) {
+  return lasts(fit, effect) ? 2 * kHandicapOfUnnamed + kPerAmplitude : 0;
+}
+
 /// Whether two models have the same effects on an axis, whatever their sizes.
 bool same_on_axis(const EnlargedParameters& a, const EnlargedParameters& b, std::size_t axis) {
   const auto effects_on = [axis](const EnlargedParameters& model) {
@@ -59,7 +84,6 @@ PerAxis<double> SearchModel::false_alarm_of_slow() const {
 
 double SearchModel::price(std::size_t candidate) const {
   const Candidate& c = list_.candidates[candidate];
-  constexpr double kPerAmplitude = 7;  // about 2·ln of the number of poses
   const Eigen::Index amplitudes = with_shapes_held(c.active()).free_count();
   return 2 * (std::log(static_cast<double>(list_.family_size[c.family])) + c.handicap) +
          kPerAmplitude * static_cast<double>(std::max<Eigen::Index>(1, amplitudes));
@@ -67,8 +91,12 @@ double SearchModel::price(std::size_t candidate) const {
 
 double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
   double sum = 0;
-  for (const std::size_t k : effects) sum += price(chosen_[k]);
+  for (const std::size_t k : effects) sum += price(chosen_[k]) + surcharge(stage_.fit, k);
   return sum;
+}
+
+double SearchModel::price_in(const EnlargedFit& with, std::size_t candidate) const {
+  return price(candidate) + surcharge(with, with.parameters.effects.size() - 1);
 }
 
 double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,

@@ -49,6 +49,9 @@ class SearchModel {
   /// What a candidate must gain in χ² to be worth its amplitudes, its choice among many (which its
   /// shapes are part of) and its want of a name.
   double price(std::size_t candidate) const;
+  /// The same of the last effect of a fit. A transient of which the dwells do not show that it dies
+  /// away has no more right to a name than what has none.
+  double price_in(const EnlargedFit& with, std::size_t candidate) const;
   /// What some of the model's effects had to gain together.
   double price_of(const std::vector<std::size_t>& effects) const;
 

@@ -13,8 +13,8 @@ namespace {
 //
 // A coarser step than the declared one shows in the codes. A finer one does not: what is rounded
 // twice has every code, but the edges between them lie at edges of the finer lattice, up to half
-// of its step away. From code to code that goes up and down as a wave, and is looked for where one
-// was found.
+// of its step away. From code to code that goes up and down as a wave or a saw tooth, and is looked
+// for where one was found.
 class Quantization final : public Effect {
  public:
   std::string id() const override { return "adc.quantization"; }
@@ -83,7 +83,7 @@ class Quantization final : public Effect {
   std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const Effect& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
     if (!repeated.id().starts_with("unlisted:code_") || instances.size() != 1 ||
-        !shows_finer_step(log, axis) || !is_wave(repeated))
+        !shows_finer_step(log, axis) || !(is_wave(repeated) || is_saw_tooth(repeated)))
       return {};  // another shape in the codes is something else
     return finer_steps(log, axis, instances.front()[1], kNearby);
   }

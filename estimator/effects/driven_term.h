@@ -33,9 +33,10 @@ class DrivenTerm : public SmoothTerm {
   bool at_converter() const override { return driver_->output_of.has_value(); }
   bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
   bool guesses_at_start() const override { return !driver_->past.empty(); }
-  void displace(const VisitLog&, std::size_t visit, const double* p,
+  void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*target_.angle += of_visit(0, visit, p) * effect::kRadPerDeg;
+    head.*target_.angle +=
+        of_visit(0, visit, p) * target_.factor_at(log.visits[visit]) * effect::kRadPerDeg;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double f = driver_->output_of == input.axis ? at(input.output_V, p)
@@ -56,6 +57,12 @@ class DrivenTerm : public SmoothTerm {
     const auto [low, high] = range();
     constexpr double kFine = 1e-3;
     return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
+  }
+  /// A part of what lies between two visits, over which an edge is spread so that it can be moved.
+  double part_of_spacing() const {
+    constexpr double kPart = 0.25;
+    return kPart * (range_.second - range_.first) /
+           static_cast<double>(driver_->value.front().size());
   }
   const std::pair<double, double>& range() const { return range_; }
   const Driver& variable() const { return *driver_; }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <set>
 
 #include "estimator/kinematics.h"
 
@@ -36,6 +37,14 @@ std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& v
     rate[k] = span_s > 0 ? 3600 * (value[after] - value[before]) / span_s : 0;
   }
   return rate;
+}
+
+/// A range of which zero is the middle, where there is nothing.
+std::pair<double, double> about_zero(const PerAxis<std::vector<double>>& values) {
+  double most = 0;
+  for (const auto& of_axis : values)
+    for (const double value : of_axis) most = std::max(most, std::abs(value));
+  return {-most, most};
 }
 
 /// Sign of the last change of h, upwards before the first one.
@@ -78,6 +87,13 @@ bool Driver::varies() const {
   });
 }
 
+bool Driver::resolves(int degree) const {
+  constexpr double kPerDegree = 1.5;
+  return std::all_of(value.begin(), value.end(), [degree](const std::vector<double>& v) {
+    return static_cast<double>(std::set<double>(v.begin(), v.end()).size()) >= kPerDegree * degree;
+  });
+}
+
 std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   const auto& visits = log.visits;
   std::vector<Driver> drivers;
@@ -94,9 +110,11 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
       change_g[i].push_back(log.before(k) ? a_g[i][k] - a_g[i][k - 1] : 0.0);
     drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g[i], a_g[i], a_g[i]}});
     drivers.back().in_the_twelve = true;
+    drivers.back().component = i;
   }
   // Nothing after a long rest, so that the 12 parameters are those of rest.
   drivers.push_back({"previous_pose", "change of a_i since", change_g});
+  drivers.back().span = about_zero(change_g);
   // What only a direction decides is the simpler where an order of visits tells no more.
   for (const std::size_t way : {std::size_t{0}, std::size_t{1}}) {
     Driver& direction = add("previous_pose", [&, way](std::size_t k) {
@@ -111,15 +129,17 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   Driver& tilted = add("previous_pose", [&](std::size_t k) { return h_direction[k]; });
   tilted.past = "direction of the last turn of h";
   tilted.two_valued = true;
-  add("previous_pose", [&](std::size_t k) {
-    const Visit* before = log.before(k);
-    return before ? std::remainder(visits[k].delta_rad - before->delta_rad, 2 * std::numbers::pi)
-                  : 0.0;
-  }).past = "turn of delta since";
-  add("previous_pose", [&](std::size_t k) {
-    const Visit* before = log.before(k);
-    return before ? visits[k].h_rad - before->h_rad : 0.0;
-  }).past = "change of h since";
+  const auto add_way = [&](std::string past, const ValueAtVisit& value) {
+    Driver& way = add("previous_pose",
+                      [&](std::size_t k) { return log.before(k) == nullptr ? 0.0 : value(k); });
+    way.past = std::move(past);
+    way.span = about_zero(way.value);
+  };
+  add_way("turn of delta since", [&](std::size_t k) {
+    return std::remainder(visits[k].delta_rad - log.before(k)->delta_rad, 2 * std::numbers::pi);
+  });
+  add_way("change of h since",
+          [&](std::size_t k) { return visits[k].h_rad - log.before(k)->h_rad; });
   for (const Column& column : recorded_columns(log)) {
     add(column.name, [&](std::size_t k) { return column.value[k]; }).recorded = true;
     const std::vector<double> rate = rate_per_h(log, column.value);

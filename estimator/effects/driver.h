@@ -20,12 +20,16 @@ struct Driver {
   bool recorded = false;               ///< a column of the measurement file, or its rate
   bool two_valued = false;             ///< any function of it is a straight line
   bool in_the_twelve = false;          ///< a bias proportional to it is what K and U₀ describe
+  std::optional<std::size_t> component = {};  ///< of the specific force, along this axis
   /// Where the values can lie; without it, where they do.
   std::optional<std::pair<double, double>> span = {};
   /// The output of this axis. On the axis itself the model's output stands for it: readings that
   /// explain themselves prove nothing.
   std::optional<std::size_t> output_of = {};
+  double scatter = 0;  ///< of single readings about the value that stands for a dwell
   bool varies() const;
+  /// Whether it took enough different values to tell a polynomial of this degree.
+  bool resolves(int degree) const;
   bool is_clock() const { return name == "t_s"; }
   bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column
 };

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <set>
 #include <tuple>
 #include <utility>
 
@@ -27,10 +26,14 @@ class Polynomial final : public DrivenTerm {
       infos.push_back({"p" + std::to_string(d), target().unit(), ParameterRole::amplitude});
     return infos;
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     std::vector<double> p(parameters().size(), target().typical_size());
     std::tie(p[0], p[1]) = range();
-    if (!(p[1] > p[0])) return {};
+    if (!(p[1] > p[0]) || !variable().resolves(degree_)) return {};
+    // A scale that follows the component that it multiplies is a bias that does.
+    if (target().form == TermForm::scale && !target().second &&
+        variable().component == (axis + target().other) % kAxisCount)
+      return {};
     if (is_in_the_twelve()) {
       if (degree_ == 1) return {};
       p[2] = 0;
@@ -90,7 +93,8 @@ class HarmonicSeries final : public DrivenTerm {
 
 class Harmonic final : public DrivenTerm {
  public:
-  using DrivenTerm::DrivenTerm;
+  Harmonic(DriverPointer driver, Target target, int lowest)
+      : DrivenTerm(std::move(driver), target), lowest_(lowest) {}
 
   bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
@@ -100,15 +104,16 @@ class Harmonic final : public DrivenTerm {
   }
   // Positions at equal distances do not tell n from their number less n.
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr double kNear_rad = 1e-3;
-    constexpr std::size_t kLowest = 3, kHighest = 17;
-    std::set<long> positions;
-    for (const double value : variable().value[0])
-      positions.insert(std::lround(std::remainder(value, effect::kTurn_rad) / kNear_rad));
+    constexpr int kHighest = 18;
+    const int positions = positions_of_a_turn();
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    for (std::size_t n = kLowest; n <= kHighest && 2 * n < positions.size(); ++n)
+    for (int n = lowest_; n <= kHighest && 2 * n <= positions; ++n) {
       starts.push_back({{static_cast<double>(n), size, size}});
+      // Two positions a period show only how they differ.
+      const bool cosine = std::abs(std::cos(n * variable().value[0].front())) > 0.5;
+      if (2 * n == positions) starts.back().p[cosine ? 2 : 1] = 0;
+    }
     return starts;
   }
 
@@ -117,6 +122,19 @@ class Harmonic final : public DrivenTerm {
   double at(double value, const double* p) const override {
     return p[1] * std::cos(p[0] * value) + p[2] * std::sin(p[0] * value);
   }
+  /// As closely as two of the visits' positions lie together.
+  int positions_of_a_turn() const {
+    constexpr double kNear_rad = 1e-3;
+    std::vector<double> places = variable().value[0];
+    std::sort(places.begin(), places.end());
+    double closest_rad = effect::kTurn_rad;
+    for (std::size_t k = 1; k < places.size(); ++k)
+      if (const double apart_rad = places[k] - places[k - 1]; apart_rad > kNear_rad)
+        closest_rad = std::min(closest_rad, apart_rad);
+    return static_cast<int>(std::lround(effect::kTurn_rad / closest_rad));
+  }
+
+  int lowest_;
 };
 
 class Wave final : public DrivenTerm {
@@ -230,10 +248,14 @@ class Logarithm final : public DrivenTerm {
 
 std::string Target::words() const {
   if (form == TermForm::geometry) {
-    if (angle == &HeadGeometry::h_rad) return ", added to h";
-    if (angle == &HeadGeometry::roll_rad) return ", added to the base roll";
-    if (angle == &HeadGeometry::skew_rad) return ", added to the skew of the spindle";
-    return ", added to delta";
+    const char* const grows = pull == Pull::cosine_of_h ? ", times the cosine of h"
+                              : pull == Pull::sine_of_h ? ", times the sine of h"
+                                                        : "";
+    const char* const to = angle == &HeadGeometry::h_rad      ? ", added to h"
+                           : angle == &HeadGeometry::roll_rad ? ", added to the base roll"
+                           : angle == &HeadGeometry::skew_rad ? ", added to the skew of the spindle"
+                                                              : ", added to delta";
+    return std::string(grows) + to;
   }
   static const char* const kComponent[] = {"its own component", "the component of the next axis",
                                            "the component of the axis after the next"};
@@ -258,6 +280,18 @@ double Target::factor(const TermInput& input) const {
   return component_g(other) * (second ? component_g(*second) : 1);
 }
 
+double Target::factor_at(const Visit& visit) const {
+  switch (pull) {
+    case Pull::none:
+      break;
+    case Pull::cosine_of_h:
+      return std::cos(visit.h_rad);
+    case Pull::sine_of_h:
+      return std::sin(visit.h_rad);
+  }
+  return 1;
+}
+
 double legendre_series(double value, double low, double high, const double* c, int degree) {
   constexpr int kContinued = 2;  // the end slope of a higher degree is too uncertain
   const double position = (2 * value - low - high) / (high - low);
@@ -279,8 +313,8 @@ std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& targe
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order) {
   return std::make_unique<HarmonicSeries>(std::move(driver), target, order);
 }
-std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target) {
-  return std::make_unique<Harmonic>(std::move(driver), target);
+std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target, int lowest) {
+  return std::make_unique<Harmonic>(std::move(driver), target, lowest);
 }
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest) {

@@ -11,6 +11,9 @@
 
 namespace plumbline {
 
+/// What an angle of the head may grow with besides: what pulls at a tilted spindle.
+enum class Pull { none, cosine_of_h, sine_of_h };
+
 /// What a function of the visits acts on.
 struct Target {
   TermForm form = TermForm::bias;
@@ -18,12 +21,15 @@ struct Target {
   /// Scale: the components multiplied are those of axes i + other and, if any, i + second.
   std::size_t other = 0;
   std::optional<std::size_t> second = {};
+  Pull pull = Pull::none;  ///< geometry
 
   std::string words() const;
   const char* unit() const;
   double typical_size() const;
   /// What the function is multiplied with: for a scale the components, g or g².
   double factor(const TermInput& input) const;
+  /// The same for an angle.
+  double factor_at(const Visit& visit) const;
 };
 
 /// Σ c_d·P_d, d = 1 … degree, of the range from low to high; beyond it straight on up to degree 2,
@@ -39,9 +45,9 @@ struct Cycles {
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree);
 /// Harmonics of order 1 … `order` of an angle.
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order);
-/// One harmonic of an angle, the third or a higher one, as far as the positions tell it from lower
+/// One harmonic of an angle, this one or a higher one, as far as the positions tell it from lower
 /// ones.
-std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target);
+std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target, int lowest);
 /// One wave of unknown period, none shorter than `shortest`.
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest = 0);
@@ -50,9 +56,17 @@ bool is_wave(const Effect& effect);
 /// A bell of unknown middle and width: something that happened once and took a while, or one place
 /// of an angle.
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
+/// The same between two unknown values of an angle and nothing elsewhere.
+std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target);
 /// There for part of every period, of unknown length and width: something switches on and off.
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
-/// Nothing on one side of an unknown value, proportional to the distance from it on the other.
+/// Grows in a straight line and falls back at once, over and over.
+std::unique_ptr<SmoothTerm> saw_tooth(DriverPointer driver, const Target& target);
+/// Whether this is a saw_tooth(): its parameters are the width of an edge, period, place of an edge
+/// and amplitude.
+bool is_saw_tooth(const Effect& effect);
+/// Nothing on one side of an unknown value, proportional to the distance from it on the other; of a
+/// component of the specific force also nothing up to an unknown size on both sides.
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
 /// How a step is searched for; once found, both say the same.
 enum class StepEdge { sharp, gradual };

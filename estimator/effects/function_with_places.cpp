@@ -1,6 +1,7 @@
 // Functions of a driver at some values of which something happens.
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,10 @@ class Bell final : public DrivenTerm {
 
   std::vector<ParameterInfo> parameters() const override {
     const char* unit = variable().angle ? "rad" : "";
+    if (is_sparse())
+      return {{"middle", unit, ParameterRole::index},
+              {"width", unit, ParameterRole::index},
+              {"p", target().unit(), ParameterRole::amplitude}};
     return {place("middle"),
             {"width", unit, ParameterRole::shape},
             {"p", target().unit(), ParameterRole::amplitude}};
@@ -22,6 +27,15 @@ class Bell final : public DrivenTerm {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
+    if (is_sparse()) {
+      const std::set<double> places(variable().value[0].begin(), variable().value[0].end());
+      const double apart =
+          (high - low) / static_cast<double>(std::max<std::size_t>(1, places.size() - 1));
+      for (const double middle : places)
+        for (const double share : {0.4, 0.8})
+          starts.push_back({{middle, share * apart, target().typical_size()}});
+      return starts;
+    }
     for (const double share : {1.0 / 60, 1.0 / 30, 1.0 / 15}) {
       const double width = share * (high - low);
       const auto steps = static_cast<long>((high - low) / (1.5 * width));
@@ -33,11 +47,60 @@ class Bell final : public DrivenTerm {
   }
 
  private:
+  /// Whether a bell may stand between two of its values, where nothing tells its height.
+  bool is_sparse() const {
+    constexpr int kDense = 12;
+    return !variable().resolves(kDense);
+  }
   std::string function() const override { return "bell"; }
   double at(double value, const double* p) const override {
     const double away = value - p[0];
     const double x = (variable().angle ? std::remainder(away, effect::kTurn_rad) : away) / p[1];
     return p[2] * std::exp(-0.5 * x * x);
+  }
+};
+
+class Sector final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    const double fine = kFine * kEdge_rad;
+    return {{"middle", "rad", ParameterRole::shape, fine, true},
+            {"width", "rad", ParameterRole::shape, fine},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double width_rad : {0.7, 1.2, 2.0})
+      for (double middle = low; middle < high; middle += 0.35 * width_rad)
+        starts.push_back({{middle, width_rad, target().typical_size()}});
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    // Between two positions nothing moves an edge: each is tried at several.
+    constexpr int kPlaces = 3;
+    constexpr double kApart_rad = 5 * effect::kRadPerDeg;
+    std::vector<Hypothesis> others;
+    for (int low = -kPlaces; low <= kPlaces; ++low)
+      for (int high = -kPlaces; high <= kPlaces; ++high) {
+        const double width_rad = found.p[1] + kApart_rad * (high - low);
+        if (width_rad > kApart_rad)
+          others.push_back({{found.p[0] + 0.5 * kApart_rad * (high + low), width_rad, found.p[2]}});
+      }
+    return others;
+  }
+
+ private:
+  static constexpr double kEdge_rad = 1 * effect::kRadPerDeg;
+  static constexpr double kFine = 0.1;
+
+  std::string function() const override { return "sector"; }
+  double at(double value, const double* p) const override {
+    const double from_middle = std::abs(std::remainder(value - p[0], effect::kTurn_rad));
+    return p[2] / (1 + std::exp((from_middle - 0.5 * p[1]) / kEdge_rad));
   }
 };
 
@@ -80,12 +143,7 @@ class Pulses final : public DrivenTerm {
     const double from_middle = std::abs(std::remainder(value - p[3], p[1]));
     return p[4] / (1 + std::exp((from_middle - 0.5 * p[2]) / p[0]));
   }
-  /// A part of the time from pose to pose, over which an edge is spread so that it can be moved.
-  double edge() const {
-    constexpr double kPart = 0.25;
-    const auto [low, high] = range();
-    return kPart * (high - low) / static_cast<double>(variable().value[0].size());
-  }
+  double edge() const { return part_of_spacing(); }
   /// Two steps, a period apart, and one back.
   std::vector<Hypothesis> from_steps(const std::vector<std::vector<double>>& steps) const {
     if (steps.size() != 3) return {};
@@ -106,6 +164,75 @@ class Pulses final : public DrivenTerm {
     for (const double share : {0.2, 0.35, 0.5, 0.65, 0.8})  // of a period
       found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
     return found;
+  }
+};
+
+class SawTooth final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    const double fine = kFine * edge();
+    return {{"edge", "", ParameterRole::index},
+            {"period", "", ParameterRole::shape, fine},
+            {"at", "", ParameterRole::shape, fine, true},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kMostTeeth = 12;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int halves = 4; halves <= 2 * kMostTeeth; ++halves) add(2 * (high - low) / halves, starts);
+    return starts;
+  }
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& instances) const override {
+    std::vector<Hypothesis> found;
+    if (repeated.id() == id() && is_wave(repeated)) {
+      double longest = 0;
+      for (const auto& wave : instances) longest = std::max(longest, wave[1]);
+      for (const double share : {0.97, 1.0, 1.03}) add(share * longest, found);
+    }
+    const auto* switching = dynamic_cast<const Pulses*>(&repeated);
+    if (switching != nullptr && repeated.id() == id())
+      for (const double share : {0.97, 1.0, 1.03}) add(share * instances.front()[1], found);
+    if (repeated.id() == "adc.code_step" && variable().output_of && instances.size() > 1) {
+      std::vector<double> places;
+      for (const auto& step : instances) places.push_back(step[1]);
+      std::sort(places.begin(), places.end());
+      for (std::size_t k = 1; k < places.size(); ++k)
+        found.push_back({{edge(), places[k] - places[k - 1], places[k], target().typical_size()}});
+    }
+    return found;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 4;
+    constexpr double kReach = 0.1;  // of a tooth
+    const double span = range().second - range().first, teeth = span / found.p[1];
+    std::vector<Hypothesis> others;
+    for (int period = -kPlaces; period <= kPlaces; ++period)
+      for (int at = -kPlaces; at <= kPlaces; ++at)
+        others.push_back({{found.p[0], found.p[1] * (1 + kReach * period / (teeth * kPlaces)),
+                           found.p[2] + kReach * found.p[1] * at / kPlaces, found.p[3]}});
+    return others;
+  }
+
+ private:
+  std::string function() const override { return "saw tooth"; }
+  double at(double value, const double* p) const override {
+    const double cycles = (value - p[2]) / p[1], edge = std::round(cycles);
+    const double fallen = 1 - effect::share_below(edge * p[1] + p[2], value, p[0]);
+    return p[3] * (cycles - (edge - 1 + fallen) - 0.5);
+  }
+  static constexpr double kFine = 0.1;
+  /// Noise of single readings reaches over a fall; between two visits it could not be moved.
+  double edge() const { return variable().scatter > 0 ? variable().scatter : part_of_spacing(); }
+  void add(double period, std::vector<Hypothesis>& starts) const {
+    constexpr int kPlaces = 6;
+    for (int k = 0; k < kPlaces; ++k)
+      starts.push_back(
+          {{edge(), period, range().first + period * k / kPlaces, target().typical_size()}});
   }
 };
 
@@ -130,6 +257,11 @@ class Bend final : public DrivenTerm {
       // The two sides differ by a straight line.
       if (!is_in_the_twelve()) starts.push_back({{low, high, -1, at, target().typical_size()}});
     }
+    if (!variable().component) return starts;
+    const double most = std::max(std::abs(low), std::abs(high));
+    for (const double side : {kOdd, kEven})
+      for (int k = 1; k < kParts; ++k)
+        starts.push_back({{low, high, side, most * k / kParts, target().typical_size()}});
     return starts;
   }
 
@@ -140,8 +272,14 @@ class Bend final : public DrivenTerm {
     constexpr double kEnd = 0.08;
     const double end = kEnd * (p[1] - p[0]);
     if (p[3] < p[0] + end || p[3] > p[1] - end) return 0;
+    if (p[2] == kOdd || p[2] == kEven) {
+      const double beyond = std::max(0.0, std::abs(value) - p[3]);
+      return p[4] * (p[2] == kOdd ? std::copysign(beyond, value) : beyond);
+    }
     return p[4] * std::max(0.0, p[2] * (value - p[3]));
   }
+  /// On both sides of zero, beyond the same size.
+  static constexpr double kOdd = 0, kEven = 2;
 };
 
 class Step final : public DrivenTerm {
@@ -236,6 +374,15 @@ class PlayLag final : public DrivenTerm {
 
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target) {
   return std::make_unique<Bell>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target) {
+  return std::make_unique<Sector>(std::move(angle), target);
+}
+std::unique_ptr<SmoothTerm> saw_tooth(DriverPointer driver, const Target& target) {
+  return std::make_unique<SawTooth>(std::move(driver), target);
+}
+bool is_saw_tooth(const Effect& effect) {
+  return dynamic_cast<const SawTooth*>(&effect) != nullptr;
 }
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
   return std::make_unique<Pulses>(std::move(driver), target);

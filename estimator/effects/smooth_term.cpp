@@ -39,6 +39,7 @@ Driver code_driver(const VisitLog& log, std::size_t axis) {
   Driver driver{std::string("code_") + kAxisName[axis], "", {}};
   driver.in_the_twelve = true;
   driver.output_of = axis;
+  driver.scatter = log.input_sd_V[axis];
   for (const Visit& visit : log.visits)
     for (auto& values : driver.value) values.push_back(visit.mean_V[axis]);
   return driver;
@@ -116,6 +117,8 @@ class TermList {
       return;
     }
     for (const Target& target : {kBias, kScale, kDelta, kH}) {
+      // What a component does to the head is a function of the angles.
+      if (driver->component && target.form == TermForm::geometry) continue;
       // A bias or scale that follows the time or a column in a straight line is a listed effect.
       const bool listed = (clock || column) && target.form != TermForm::geometry;
       if (any_ || !listed) add_polynomials(driver, target, {1});
@@ -136,8 +139,7 @@ class TermList {
     if (driver->in_the_twelve) add_of_component(driver);
     if (driver->angle) add_of_angle(driver);
     if (driver->name == "h_deg") add_harmonics_of_h(driver);
-    if (driver->name == "delta_deg")
-      for (const Target& target : {kBias, kScale}) add(harmonic(driver, target));
+    if (driver->name == "delta_deg") add_harmonics_of_delta(driver);
   }
   void add_of_column(const DriverPointer& driver) {
     columns_.push_back(driver);
@@ -147,6 +149,7 @@ class TermList {
   void add_of_clock(const DriverPointer& clock) {
     add(bell(clock, kBias));
     add(pulses(clock, kBias));
+    add(saw_tooth(clock, kBias));
     for (const Target& target : {kBias, kScale}) {
       add(power(clock, target));
       add(logarithm(clock, target));
@@ -168,17 +171,40 @@ class TermList {
         add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
     for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     add_steps(driver, kBias);
+    add(bell(driver, kBias));
+    // What is no shape of its own.
+    add_polynomials(driver, kBias, {4, 6, 8, 12});
   }
   void add_of_angle(const DriverPointer& angle) {
     add_polynomials_of_others(angle, {2, 3});
-    for (const Target& target : {kBias, kDelta, kH}) add(bell(angle, target));
+    for (const Target& target : {kBias, kDelta, kH}) {
+      add(bell(angle, target));
+      add(sector(angle, target));
+    }
     for (const Target& target : {kRoll, kSkew}) add_polynomials(angle, target, {1, 2});
   }
-  /// Second to eighth harmonic of the turn that is seen in part; the first is a listed effect.
+  /// From the second harmonic of the turn that is seen in part; the first is a listed effect.
   void add_harmonics_of_h(const DriverPointer& h) {
     const auto [low, high] = std::minmax_element(h->value[0].begin(), h->value[0].end());
     const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
     for (const Target& target : {kBias, kH}) add(wave(h, target, {2 * turns, turns, 8 * turns}));
+    for (const Target& target : {kDelta, kH}) {
+      add(harmonic(h, target, 9));
+      add_steps(h, target);
+      add(bell(h, target));
+    }
+  }
+  void add_harmonics_of_delta(const DriverPointer& delta) {
+    for (const Target& target : {kBias, kScale}) add(harmonic(delta, target, 3));
+    add(harmonic(delta, kH, 1));
+    constexpr int kFirstUnlisted = 18;
+    add(harmonic(delta, kDelta, kFirstUnlisted));
+    for (const Target& angle : {kDelta, kH})
+      for (const Pull pull : {Pull::cosine_of_h, Pull::sine_of_h}) {
+        Target target = angle;
+        target.pull = pull;
+        add(harmonic(delta, target, 1));
+      }
   }
   /// What winds up with the spindle does not know that 360° are 0°.
   void add_of_wound_up_spindle() {
@@ -194,6 +220,7 @@ class TermList {
     add_polynomials(code, kBias, {2, 3, 5});
     add(bend(code, kBias));
     add_steps(code, kBias);
+    add(saw_tooth(code, kBias));
   }
 
   const VisitLog& log_;
