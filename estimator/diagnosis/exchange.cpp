@@ -48,15 +48,33 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
 
 }  // namespace
 
-bool exchange_one(SearchModel& model) {
+namespace {
+
+/// What one candidate may take the place of: one effect, two, or all that one axis has.
+std::vector<std::vector<std::size_t>> exchangeable(const SearchModel& model) {
   std::vector<std::vector<std::size_t>> subsets;
   for (std::size_t k = 0; k < model.size(); ++k) subsets.push_back({k});
   for (std::size_t k = 0; k < model.size(); ++k)
     for (std::size_t l = k + 1; l < model.size(); ++l) subsets.push_back({k, l});
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    std::vector<std::size_t> of_axis;
+    for (std::size_t k = 0; k < model.size(); ++k)
+      if (model.candidate(k).axis == axis &&
+          model.candidate(k).effect->subject() == Subject::sensor)
+        of_axis.push_back(k);
+    if (of_axis.size() > 2) subsets.push_back(std::move(of_axis));
+  }
   std::erase_if(subsets, [&](const std::vector<std::size_t>& subset) {
     return std::any_of(subset.begin(), subset.end(),
                        [&](std::size_t k) { return model.is_certain(model.candidate(k)); });
   });
+  return subsets;
+}
+
+}  // namespace
+
+bool exchange_one(SearchModel& model) {
+  const std::vector<std::vector<std::size_t>> subsets = exchangeable(model);
   const CandidateResponses& responses = model.responses();
   std::vector<std::vector<SearchModel::Entry>> exchanges(subsets.size());
   parallel_for(subsets.size(),

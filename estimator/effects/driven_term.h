@@ -58,6 +58,11 @@ class DrivenTerm : public SmoothTerm {
     constexpr double kFine = 1e-3;
     return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
   }
+  /// A scale that follows the component that it multiplies is a bias that does.
+  bool is_bias_in_disguise(std::size_t axis) const {
+    return target_.form == TermForm::scale && !target_.second &&
+           driver_->component == (axis + target_.other) % kAxisCount;
+  }
   /// A part of what lies between two visits, over which an edge is spread so that it can be moved.
   double part_of_spacing() const {
     constexpr double kPart = 0.25;

@@ -30,10 +30,7 @@ class Polynomial final : public DrivenTerm {
     std::vector<double> p(parameters().size(), target().typical_size());
     std::tie(p[0], p[1]) = range();
     if (!(p[1] > p[0]) || !variable().resolves(degree_)) return {};
-    // A scale that follows the component that it multiplies is a bias that does.
-    if (target().form == TermForm::scale && !target().second &&
-        variable().component == (axis + target().other) % kAxisCount)
-      return {};
+    if (is_bias_in_disguise(axis)) return {};
     if (is_in_the_twelve()) {
       if (degree_ == 1) return {};
       p[2] = 0;
@@ -58,6 +55,24 @@ class Polynomial final : public DrivenTerm {
   }
 
   int degree_;
+};
+
+/// Without what is linear: a product of third order by itself.
+class Square final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    if (is_bias_in_disguise(axis)) return {};
+    return {{{target().typical_size()}}};
+  }
+
+ private:
+  std::string function() const override { return "square"; }
+  double at(double value, const double* p) const override { return p[0] * value * value; }
 };
 
 class HarmonicSeries final : public DrivenTerm {
@@ -149,10 +164,14 @@ class Wave final : public DrivenTerm {
             {"c", target().unit(), ParameterRole::amplitude},
             {"s", target().unit(), ParameterRole::amplitude}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
+    // What an axis does again and again over its range it does by its own component.
+    const auto own = variable().component;
+    if (own && (own != axis || !variable().resolves(static_cast<int>(2 * cycles_.most))))
+      return starts;
     const auto steps = std::lround((cycles_.most - cycles_.least) / cycles_.step);
     for (long k = 0; k <= steps; ++k) {
       const double period = (high - low) / (cycles_.least + static_cast<double>(k) * cycles_.step);
@@ -309,6 +328,9 @@ double legendre_series(double value, double low, double high, const double* c, i
 
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree) {
   return std::make_unique<Polynomial>(std::move(driver), target, degree);
+}
+std::unique_ptr<SmoothTerm> square(DriverPointer driver, const Target& target) {
+  return std::make_unique<Square>(std::move(driver), target);
 }
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order) {
   return std::make_unique<HarmonicSeries>(std::move(driver), target, order);

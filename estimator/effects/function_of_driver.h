@@ -43,6 +43,8 @@ struct Cycles {
 
 /// legendre_series() over the range that was seen.
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree);
+/// Of a component of the specific force.
+std::unique_ptr<SmoothTerm> square(DriverPointer driver, const Target& target);
 /// Harmonics of order 1 … `order` of an angle.
 std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& target, int order);
 /// One harmonic of an angle, this one or a higher one, as far as the positions tell it from lower

@@ -293,15 +293,21 @@ class Step final : public DrivenTerm {
     return {place("at"), {"width", "", width}, {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr int kParts = 12;
     const auto [low, high] = range();
-    const std::vector<double> shares =
-        edge_ == StepEdge::sharp ? std::vector{0.01} : std::vector{0.04, 0.13};
+    const bool sharp = edge_ == StepEdge::sharp;
+    std::vector<double> widths = {0.04 * (high - low), 0.13 * (high - low)};
+    int parts = 12;
+    // A large one is wrong by much at every visit between it and the place tried.
+    if (sharp) {
+      constexpr int kVisits = 2;
+      const bool clock = variable().is_clock();
+      widths = {clock ? part_of_spacing() : 0.01 * (high - low)};
+      parts = clock ? static_cast<int>(variable().value[0].size()) / kVisits : 32;
+    }
     std::vector<Hypothesis> starts;
-    for (const double share : shares)
-      for (int k = 1; k < kParts; ++k)
-        starts.push_back(
-            {{low + (high - low) * k / kParts, share * (high - low), target().typical_size()}});
+    for (const double width : widths)
+      for (int k = 1; k < parts; ++k)
+        starts.push_back({{low + (high - low) * k / parts, width, target().typical_size()}});
     return starts;
   }
   std::vector<Hypothesis> closer(const VisitLog&, std::size_t,

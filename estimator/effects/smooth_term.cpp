@@ -135,6 +135,7 @@ class TermList {
     if (clock || column)
       for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     if (column) add_of_column(driver);
+    if (driver->is_rate()) add_steps(driver, kBias);
     if (clock) add_of_clock(driver);
     if (driver->in_the_twelve) add_of_component(driver);
     if (driver->angle) add_of_angle(driver);
@@ -145,6 +146,7 @@ class TermList {
     columns_.push_back(driver);
     for (const Target& target : {kBias, kScale}) add_steps(driver, target);
     for (const Target& target : {kBias, kScale}) add(play(driver, target));
+    add(wave(driver, kBias, {1.5, 0.5, 10}));
   }
   void add_of_clock(const DriverPointer& clock) {
     add(bell(clock, kBias));
@@ -167,11 +169,14 @@ class TermList {
     // Products of third order.
     add_polynomials_of_others(driver, {2});
     for (std::size_t other = 0; other < kAxisCount; ++other)
+      add(square(driver, {.form = TermForm::scale, .other = other}));
+    for (std::size_t other = 0; other < kAxisCount; ++other)
       for (std::size_t second = other + 1; second < kAxisCount; ++second)
         add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
     for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     add_steps(driver, kBias);
     add(bell(driver, kBias));
+    add(wave(driver, kBias, {1.5, 0.5, 20}));
     // What is no shape of its own.
     add_polynomials(driver, kBias, {4, 6, 8, 12});
   }
