@@ -14,6 +14,17 @@ namespace plumbline {
 
 namespace {
 
+/// Sum of squares of a fit. What a candidate makes of the first visit is a guess, which counts
+/// neither for it nor for what it would replace.
+double chi2_beside(const SearchModel& model, const Candidate& candidate, const EnlargedFit& fit) {
+  if (!candidate.effect->guesses_at_start()) return fit.chi2;
+  const Eigen::Index n = std::ssize(model.input().log.visits);
+  double at_start = 0;
+  for (Eigen::Index row = 0; row < mean_rows(model.input().log); row += n)
+    at_start += fit.whitened_residual(row) * fit.whitened_residual(row);
+  return fit.chi2 - at_start;
+}
+
 /// What is worth its price in the place of a subset, likeliest first.
 std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const CandidateResponses& responses,
@@ -38,8 +49,9 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     const EnlargedFit with =
         model.fit_with(gains, index, candidate, first_order(static_cast<Eigen::Index>(index)));
     if (!with.determined) continue;
-    const double cost = with.chi2 + model.price_in(with, index);
-    if (!(cost < model.stage().fit.chi2 + spent - kClearly)) continue;
+    const double cost = chi2_beside(model, candidate, with) + model.price_in(with, index);
+    const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
+    if (!(cost < now - kClearly)) continue;
     const double p = model.p_of(model.log_p_of(index, without, with, gains.dof(index)));
     if (p <= model.options().false_alarm) exchanges.push_back({index, p, with.parameters});
   }

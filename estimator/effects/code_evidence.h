@@ -49,8 +49,8 @@ struct Lattice {
 };
 
 /// In how many dwells of `set` the readings of an axis step over a code of `adc`, bits that are
-/// stuck left out: most readings share few codes, and none lies between two that are common. Noise of
-/// a sound converter does not do that.
+/// stuck left out: most readings share few codes, and none lies between two that are common. Noise
+/// of a sound converter does not do that.
 std::size_t dwells_over_codes(const MeasurementSet& set, std::size_t axis, const Adc& adc,
                               const std::vector<StuckBit>& stuck = {});
 

@@ -58,6 +58,10 @@ class DrivenTerm : public SmoothTerm {
     constexpr double kFine = 1e-3;
     return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
   }
+  /// What an axis does again and again over its range it does by its own component.
+  bool is_of_another_axis(std::size_t axis) const {
+    return driver_->component.value_or(axis) != axis;
+  }
   /// A scale that follows the component that it multiplies is a bias that does.
   bool is_bias_in_disguise(std::size_t axis) const {
     return target_.form == TermForm::scale && !target_.second &&

@@ -54,7 +54,7 @@ struct TermInput {
   /// What the converter is given: U_i0 + Σ_j K_ij·a_j and the axis's terms that are not the
   /// converter's own.
   double output_V;
-  double K_V_per_g;                         ///< K_ii
+  double K_V_per_g;  ///< K_ii
 
   const Visit& at() const { return log.visits[visit]; }
   double a() const { return a_g[visit](static_cast<Eigen::Index>(axis)); }

@@ -168,14 +168,12 @@ class Wave final : public DrivenTerm {
     const auto [low, high] = range();
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    // What an axis does again and again over its range it does by its own component.
-    const auto own = variable().component;
-    if (own && (own != axis || !variable().resolves(static_cast<int>(2 * cycles_.most))))
-      return starts;
+    if (is_of_another_axis(axis)) return starts;
     const auto steps = std::lround((cycles_.most - cycles_.least) / cycles_.step);
     for (long k = 0; k <= steps; ++k) {
       const double period = (high - low) / (cycles_.least + static_cast<double>(k) * cycles_.step);
-      if (period >= shortest_) starts.push_back({{low, period, size, size}});
+      const bool is_seen = !variable().component || variable().resolves(static_cast<int>(k) + 2);
+      if (period >= shortest_ && is_seen) starts.push_back({{low, period, size, size}});
     }
     return starts;
   }

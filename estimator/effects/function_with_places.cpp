@@ -178,10 +178,11 @@ class SawTooth final : public DrivenTerm {
             {"at", "", ParameterRole::shape, fine, true},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     constexpr int kMostTeeth = 12;
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
+    if (is_of_another_axis(axis) || !variable().resolves(4 * kMostTeeth)) return starts;
     for (int halves = 4; halves <= 2 * kMostTeeth; ++halves) add(2 * (high - low) / halves, starts);
     return starts;
   }

@@ -177,6 +177,7 @@ class TermList {
     add_steps(driver, kBias);
     add(bell(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 20}));
+    add(saw_tooth(driver, kBias));
     // What is no shape of its own.
     add_polynomials(driver, kBias, {4, 6, 8, 12});
   }

@@ -88,6 +88,101 @@ TEST(Structure, AHighHarmonicOfTheSpindleIsOne) {
   expect_only_structure(options, {"delta_deg", "bias", "harmonic"});
 }
 
+// As three listed effects that cancelled.
+TEST(Structure, AResonanceAtOneValueOfAComponentIsABell) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) {
+    return 1e-3 * std::exp(-0.5 * std::pow((a_g[0] - 0.35) / 0.06, 2));
+  };
+  expect_only_structure(options, {"a_x", "bias", "bell"});
+}
+
+TEST(Structure, AGainThatFallsBeyondTheSameSizeOnBothSidesIsOneBend) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) {
+    const double beyond_g = std::max(0.0, std::abs(a_g[0]) - 0.6);
+    return 3e-3 * std::copysign(beyond_g, a_g[0]);
+  };
+  expect_only_structure(options, {"a_x", "bias", "bend"});
+}
+
+// By the time, which rises with h.
+TEST(Structure, AProductOfThirdOrderIsThatAndNoBendInTime) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) { return 2e-3 * a_g[0] * a_g[2] * a_g[2]; };
+  expect_only_structure(options, {"a_z", "scale", "square"});
+}
+
+TEST(Structure, WhatFallsBackAgainAndAgainIsASawTooth) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto&, double t_s) {
+    const double cycles = t_s / 97;
+    return 5e-4 * (cycles - std::floor(cycles) - 0.5);
+  };
+  expect_only_structure(options, {"t_s", "bias", "saw tooth"});
+}
+
+TEST(Structure, AWheelThatIsOffOverPartOfATurnIsASector) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.delta_error_deg = [](double delta_deg, double) {
+    return delta_deg > 204 && delta_deg < 276 ? 1.0 : 0.0;
+  };
+  expect_only_structure(options, {"delta_deg", "geometry", "sector, added to delta"});
+}
+
+// As one bias for each harmonic and axis. Every second position is off the other way.
+TEST(Structure, TheLastHarmonicThatThePositionsShowIsAnAngle) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.delta_error_deg = [](double delta_deg, double) {
+    return 0.5 * std::cos(18 * delta_deg * std::acos(-1.0) / 180);
+  };
+  expect_only_structure(options, {"delta_deg", "geometry", "harmonic, added to delta"});
+}
+
+TEST(Structure, AWobbleThatGrowsWithTheWeightIsOneHarmonic) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_error_deg = [](double delta_deg, double h_deg) {
+    const double degree = std::acos(-1.0) / 180;
+    return 0.6 * std::cos(4 * delta_deg * degree) * std::cos(h_deg * degree);
+  };
+  expect_only_structure(options,
+                        {"delta_deg", "geometry", "harmonic, times the cosine of h, added to h"});
+}
+
+// Between two rings h rises and time passes: the time would have to jump just there.
+TEST(Structure, ATiltThatJumpsBetweenTwoRingsJumpsInH) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.h_error_deg = [](double, double h_deg) { return h_deg > 45 ? 0.7 : 0.0; };
+  expect_only_structure(options, {"h_deg", "geometry", "step, added to h"});
+}
+
+// As a settling that takes for ever.
+TEST(Structure, WhatAPoseLeavesForGoodIsNoSettling) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 20;
+  options.more_x_V = [before_g = 0.0, at_g = 0.0, last_s = 0.0](const auto& a_g,
+                                                                double t_s) mutable {
+    constexpr double kBetweenPoses_s = 1;
+    if (t_s > last_s + kBetweenPoses_s) before_g = at_g;
+    at_g = a_g[0];
+    last_s = t_s;
+    return 1e-3 * (before_g - at_g);
+  };
+  expect_only_structure(
+      options, {"previous_pose", "bias", "polynomial of degree 1 in the change of a_i since"});
+}
+
 // The way of the last turn, kept while only h moves.
 TEST(Structure, WhatDependsOnTheDirectionOfTheTurnIsNoPolynomialOfIt) {
   SyntheticOptions options;

@@ -24,6 +24,8 @@ struct SyntheticOptions {
   /// Anything else that x does, V, of the specific force in g and the time in s.
   std::function<double(const std::array<double, 3>&, double)> more_x_V = {};
   std::function<double(double)> base_roll_rad = {};  ///< at a time in s
+  /// What is added to δ and to h at a position, degrees.
+  std::function<double(double delta_deg, double h_deg)> delta_error_deg = {}, h_error_deg = {};
 };
 
 struct SyntheticRun {
@@ -49,7 +51,13 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
   result.description.adc = adc;
   const double gamma = 9.8101 / kStandardGravity_mps2;
 
-  const auto add_sample = [&](SampleTable& table, double t_s, double delta_deg, double h_deg) {
+  const auto add_sample = [&](SampleTable& table, double t_s, double to_delta_deg,
+                              double to_h_deg) {
+    const auto error_deg = [&](const auto& error) {
+      return error ? error(to_delta_deg, to_h_deg) : 0;
+    };
+    const double delta_deg = to_delta_deg + error_deg(options.delta_error_deg);
+    const double h_deg = to_h_deg + error_deg(options.h_error_deg);
     const double c = std::cos(h_deg * kRadians);
     const double roll_rad = options.base_roll_rad ? options.base_roll_rad(t_s) : 0;
     const double cd = std::cos(delta_deg * kRadians), sd = std::sin(delta_deg * kRadians);
