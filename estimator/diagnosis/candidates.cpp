@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "estimator/effects/catalogue.h"
@@ -230,11 +231,12 @@ CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateLis
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   CandidateResponses responses;
   std::array<std::vector<ActiveEffect>, kGroups> singles;
-  for (const Candidate& candidate : list.candidates) {
-    const std::size_t group = group_of(candidate);
-    const std::vector<ActiveEffect> own = single_amplitudes(candidate);
-    responses.place.push_back({group, std::ssize(singles[group]), std::ssize(own)});
-    singles[group].insert(singles[group].end(), own.begin(), own.end());
+  std::vector<std::vector<ActiveEffect>> own(list.candidates.size());
+  parallel_for(own.size(), [&](std::size_t c) { own[c] = single_amplitudes(list.candidates[c]); });
+  for (std::size_t c = 0; c < own.size(); ++c) {
+    const std::size_t group = group_of(list.candidates[c]);
+    responses.place.push_back({group, std::ssize(singles[group]), std::ssize(own[c])});
+    std::move(own[c].begin(), own[c].end(), std::back_inserter(singles[group]));
   }
   for (std::size_t g = 0; g < kGroups; ++g) {
     CandidateResponses::Group& group = responses.groups[g];

@@ -17,7 +17,8 @@ class DrivenTerm : public SmoothTerm {
   DrivenTerm(DriverPointer driver, Target target)
       : driver_(std::move(driver)),
         target_(target),
-        range_(driver_->span ? *driver_->span : range_of(driver_->value)) {}
+        range_(driver_->span ? *driver_->span : range_of(driver_->value)),
+        values_(driver_->fewest_values()) {}
 
   std::string id() const override {
     return "unlisted:" + driver_->name + ":" + to_string(target_.form);
@@ -74,6 +75,11 @@ class DrivenTerm : public SmoothTerm {
            static_cast<double>(driver_->value.front().size());
   }
   const std::pair<double, double>& range() const { return range_; }
+  /// Whether the driver took enough different values to tell a polynomial of this degree.
+  bool resolves(int degree) const {
+    constexpr double kPerDegree = 1.5;
+    return static_cast<double>(values_) >= kPerDegree * degree;
+  }
   const Driver& variable() const { return *driver_; }
   const Target& target() const { return target_; }
   /// Whether what is linear in the driver is not to be told from the 12 parameters.
@@ -91,6 +97,7 @@ class DrivenTerm : public SmoothTerm {
   DriverPointer driver_;
   Target target_;
   std::pair<double, double> range_;  ///< asked for whenever a parameter is described
+  std::size_t values_;               ///< likewise: different ones
 };
 
 }  // namespace plumbline

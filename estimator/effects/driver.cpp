@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <set>
 
@@ -87,11 +88,11 @@ bool Driver::varies() const {
   });
 }
 
-bool Driver::resolves(int degree) const {
-  constexpr double kPerDegree = 1.5;
-  return std::all_of(value.begin(), value.end(), [degree](const std::vector<double>& v) {
-    return static_cast<double>(std::set<double>(v.begin(), v.end()).size()) >= kPerDegree * degree;
-  });
+std::size_t Driver::fewest_values() const {
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  for (const std::vector<double>& of_axis : value)
+    fewest = std::min(fewest, std::set<double>(of_axis.begin(), of_axis.end()).size());
+  return fewest;
 }
 
 std::vector<Driver> instantaneous_drivers(const VisitLog& log) {

@@ -28,8 +28,8 @@ struct Driver {
   std::optional<std::size_t> output_of = {};
   double scatter = 0;  ///< of single readings about the value that stands for a dwell
   bool varies() const;
-  /// Whether it took enough different values to tell a polynomial of this degree.
-  bool resolves(int degree) const;
+  /// How many different values it took on any axis at least.
+  std::size_t fewest_values() const;
   bool is_clock() const { return name == "t_s"; }
   bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column
 };

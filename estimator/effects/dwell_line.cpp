@@ -31,6 +31,12 @@ struct Dwells {
   double run_s() const { return t_s(t_s.size() - 1); }
   double dwell_s() const { return step_s * static_cast<double>(off_V.rows()); }
   bool say_enough() const { return t_s.size() >= kFewestDwells && step_s > 0; }
+  /// Whether some arrivals are no whole number of samples apart.
+  bool tell_aliases() const {
+    constexpr double kApart = 1e-4;  // samples
+    const Eigen::ArrayXd samples_apart = t_s / step_s;
+    return ((samples_apart - samples_apart.round()).abs() > kApart).any();
+  }
 };
 
 /// Their times, and zeros.
@@ -241,7 +247,7 @@ Peak strongest_alias(const Dwells& dwells, double f_hz, double width_hz,
     const Peak mirrored = peak_at(dwells, rate_hz - best.f_hz);
     if (!is_clearly_likelier(best, mirrored, dwells.t_s.size())) best = mirrored;
   }
-  for (int rates = 1; rates <= kRates; ++rates)
+  for (int rates = 1; dwells.tell_aliases() && rates <= kRates; ++rates)
     for (const double side : {-1, 1}) {
       const Peak other = strongest_near(rates * rate_hz + side * f_hz);
       if (is_clearly_likelier(other, best, dwells.t_s.size())) best = other;
@@ -268,6 +274,16 @@ bool is_steady(const Dwells& dwells, const Peak& peak) {
   return first < kMuch * second || first - second < kClearly * std::hypot(first_sd, second_sd);
 }
 
+/// Whether a line of few periods a dwell has the same phase on every arrival: a course of the
+/// dwells that is no sine, of which the slow contrasts leave what looks like one.
+bool begins_on_arrival(const Dwells& dwells, const Peak& peak) {
+  constexpr double kFewPeriods = 4;
+  constexpr double kAlike = 0.99;
+  if (dwells.slow_is_left || peak.f_hz * dwells.dwell_s() > kFewPeriods) return false;
+  const double alike = std::abs(along_columns(dwells.off_V, dwells.step_s, peak.f_hz).sum());
+  return alike > kAlike * std::abs(components(dwells, peak.f_hz).sum());
+}
+
 /// Unless noise shows one as strong somewhere among so many frequencies.
 std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double frequencies) {
   if (!(peak.apart_V2 > 0) || frequencies * std::exp(-peak.joint_V2 / peak.apart_V2) > kFalseAlarm)
@@ -275,9 +291,10 @@ std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double 
   const std::complex<double> sum = components(dwells, peak.f_hz).sum();
   const double phase =
       std::arg(sum) + 0.25 * effect::kTurn_rad - effect::kTurn_rad * peak.f_hz * dwells.origin_s;
-  return DwellLine{peak.f_hz, 2 * std::abs(sum) / (share_left(dwells, peak.f_hz) * dwells.samples),
-                   phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad),
-                   dwells.slow_is_left || is_steady(dwells, peak)};
+  return DwellLine{
+      peak.f_hz, 2 * std::abs(sum) / (share_left(dwells, peak.f_hz) * dwells.samples),
+      phase - effect::kTurn_rad * std::floor(phase / effect::kTurn_rad),
+      dwells.slow_is_left || (is_steady(dwells, peak) && !begins_on_arrival(dwells, peak))};
 }
 
 }  // namespace

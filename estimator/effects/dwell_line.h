@@ -15,7 +15,7 @@ struct DwellLine {
                     ///< alias there
   double amplitude_V = 0;
   double phase_rad = 0;  ///< 0 … 2π
-  bool steady = true;    ///< as strong at the end of a dwell as at its beginning
+  bool steady = true;  ///< as strong at the end of a dwell as at its beginning, and not begun by it
 };
 
 /// The line of one axis that noise would not often show (once in 10⁵ sets), if there is one. Looked

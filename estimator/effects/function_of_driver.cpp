@@ -29,7 +29,7 @@ class Polynomial final : public DrivenTerm {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     std::vector<double> p(parameters().size(), target().typical_size());
     std::tie(p[0], p[1]) = range();
-    if (!(p[1] > p[0]) || !variable().resolves(degree_)) return {};
+    if (!(p[1] > p[0]) || !resolves(degree_)) return {};
     if (is_bias_in_disguise(axis)) return {};
     if (is_in_the_twelve()) {
       if (degree_ == 1) return {};
@@ -172,7 +172,7 @@ class Wave final : public DrivenTerm {
     const auto steps = std::lround((cycles_.most - cycles_.least) / cycles_.step);
     for (long k = 0; k <= steps; ++k) {
       const double period = (high - low) / (cycles_.least + static_cast<double>(k) * cycles_.step);
-      const bool is_seen = !variable().component || variable().resolves(static_cast<int>(k) + 2);
+      const bool is_seen = !variable().component || resolves(static_cast<int>(k) + 2);
       if (period >= shortest_ && is_seen) starts.push_back({{low, period, size, size}});
     }
     return starts;

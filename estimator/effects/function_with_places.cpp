@@ -1,5 +1,6 @@
 // Functions of a driver at some values of which something happens.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <utility>
@@ -50,7 +51,7 @@ class Bell final : public DrivenTerm {
   /// Whether a bell may stand between two of its values, where nothing tells its height.
   bool is_sparse() const {
     constexpr int kDense = 12;
-    return !variable().resolves(kDense);
+    return !resolves(kDense);
   }
   std::string function() const override { return "bell"; }
   double at(double value, const double* p) const override {
@@ -133,8 +134,9 @@ class Pulses final : public DrivenTerm {
                                  const std::vector<std::vector<double>>& instances) const override {
     if (target().form != TermForm::bias) return {};
     if (repeated.id() == "sensor.bias_step") return from_steps(instances);
-    const bool waves = repeated.id() == id() && is_wave(repeated);
-    return waves ? from_waves(instances) : std::vector<Hypothesis>{};
+    if (repeated.id() != id()) return {};
+    if (is_saw_tooth(repeated)) return from_saw_tooth(instances.front());
+    return is_wave(repeated) ? from_waves(instances) : std::vector<Hypothesis>{};
   }
 
  private:
@@ -161,8 +163,19 @@ class Pulses final : public DrivenTerm {
     const double crest =
         longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
     std::vector<Hypothesis> found;
-    for (const double share : {0.2, 0.35, 0.5, 0.65, 0.8})  // of a period
+    for (const double share : kWidths)
       found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
+    return found;
+  }
+  static constexpr std::array kWidths = {0.2, 0.35, 0.5, 0.65, 0.8};  // of a period
+  /// Where the one falls the other may begin or end.
+  std::vector<Hypothesis> from_saw_tooth(const std::vector<double>& saw) const {
+    std::vector<Hypothesis> found;
+    const double period = saw[1], fall = saw[2];
+    for (const double share : kWidths)
+      for (const double side : {-0.5, 0.5})
+        found.push_back({{edge(), period, share * period, fall + side * share * period,
+                          target().typical_size()}});
     return found;
   }
 };
@@ -182,7 +195,7 @@ class SawTooth final : public DrivenTerm {
     constexpr int kMostTeeth = 12;
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    if (is_of_another_axis(axis) || !variable().resolves(4 * kMostTeeth)) return starts;
+    if (is_of_another_axis(axis) || !resolves(4 * kMostTeeth)) return starts;
     for (int halves = 4; halves <= 2 * kMostTeeth; ++halves) add(2 * (high - low) / halves, starts);
     return starts;
   }
