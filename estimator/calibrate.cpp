@@ -9,6 +9,7 @@
 
 #include "estimator/decision.h"
 #include "estimator/diagnosis/explain.h"
+#include "estimator/diagnosis/noise_drivers.h"
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/effects/code_evidence.h"
@@ -44,6 +45,8 @@ struct Experiment {
   Eigen::MatrixXd drivers;    ///< n × k, temperature and covariates
   PerAxis<double> white_V{};  ///< white noise of one reading; negative when unknown
   NoiseProcesses processes;
+  /// Variance of each mean beyond that of a quiet dwell, where the noise follows something.
+  PerAxis<Eigen::VectorXd> noisier_V2;
 };
 
 /// One axis on its way through the engine.
@@ -180,7 +183,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   // Edges between codes that are missing or doubled make dwells noisy, too.
   if (rounded_as_declared(experiment.input, axis)) {
     const auto& adc = experiment.input.description.adc;
-    work.known_V2 += burst_variance_V2(experiment.input.run, axis, adc ? adc->lsb_V() : 0);
+    work.known_V2 += burst_variance_V2(experiment.input.run, axis, adc ? adc->lsb_V() : 0)
+                         .cwiseMax(experiment.noisier_V2[axis]);
   }
   work.own_V2 = work.known_V2;
   work.record = identified;
@@ -346,7 +350,7 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   RunDescription description = given.description;
   if (description.adc) description.adc = aligned_with(given.run.samples, *description.adc);
   const CalibrationInput input{given.run, given.static_record, description};
-  Experiment experiment{input, pose_means(input.run), {}, {}, {}, {}, {}};
+  Experiment experiment{input, pose_means(input.run), {}, {}, {}, {}, {}, {}};
   experiment.A = design_matrix(experiment.poses, input.description.gravity);
 
   Calibration result;
@@ -367,8 +371,19 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   result.estimates.rls.emplace();
   result.pose_results.resize(n);
 
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     experiment.white_V[axis] = white_noise_V(input, axis);
+    experiment.noisier_V2[axis] = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n));
+  }
+  std::optional<VisitLog> log;
+  std::vector<NoiseDriver> noise_follows;
+  if (n >= kFewestPosesToDecide) {
+    log = make_visit_log(input.run, input.description);
+    noise_follows = noise_drivers(
+        *log, input.run, {time_blocks(experiment.poses), position_blocks(experiment.poses)});
+    for (const NoiseDriver& driver : noise_follows)
+      experiment.noisier_V2[driver.axis] += driver.excess_V2;
+  }
 
   PerAxis<AxisWork> work;
   parallel_for(kAxisCount, [&](std::size_t axis) {
@@ -438,8 +453,15 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   result.final.rls.reset();
   result.after = result.before;
   if (result.diagnosis.verdict != Verdict::undetermined) {
-    ExplainInput explain_input{
-        input, experiment.poses, experiment.windows, result.noise, {}, experiment.processes, {}};
+    ExplainInput explain_input{input,
+                               *log,
+                               noise_follows,
+                               experiment.poses,
+                               experiment.windows,
+                               result.noise,
+                               {},
+                               experiment.processes,
+                               {}};
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       explain_input.known_V2[axis] = work[axis].known_V2;
       explain_input.pooled[axis] = work[axis].pooled;

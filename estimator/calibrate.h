@@ -115,6 +115,8 @@ struct UnlistedStructure {
   double p_value = 1;
   double heldout_gain = 0;
   double sigmas = 0;  ///< as FoundEffect::sigmas
+  /// Whether it is the noise within the dwells that follows the driver: no mean knows of it.
+  bool is_of_noise() const { return shape.starts_with("noise, "); }
 };
 
 enum class Verdict { clean, explained, partly_explained, unexplained, undetermined };

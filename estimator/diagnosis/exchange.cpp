@@ -8,6 +8,7 @@
 
 #include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/slow_look.h"
+#include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -25,6 +26,31 @@ double chi2_beside(const SearchModel& model, const Candidate& candidate, const E
   return fit.chi2 - at_start;
 }
 
+/// Whether two effects mostly take back what the other does beside the 12 parameters: two names
+/// that happen to add up to something else.
+bool take_back_each_other(const SearchModel& model, std::size_t first, std::size_t second) {
+  constexpr double kMostLeft = 0.7;  // of the smaller
+  const EnlargedFit& fit = model.stage().fit;
+  constexpr Eigen::Index kTwelve = 4 * kAxisCount;
+  const Eigen::MatrixXd basis = orthonormal_basis(fit.whitened_jacobian.leftCols(kTwelve));
+  const auto contribution = [&](std::size_t effect) {
+    Eigen::Index column = kTwelve;
+    for (std::size_t e = 0; e < effect; ++e) column += fit.parameters.effects[e].free_count();
+    const ActiveEffect& active = fit.parameters.effects[effect];
+    const auto infos = active.effect->parameters();
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(fit.whitened_jacobian.rows());
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!active.free[k]) continue;
+      if (infos[k].role == ParameterRole::amplitude)
+        sum += active.p[k] * fit.whitened_jacobian.col(column);
+      ++column;
+    }
+    return Eigen::VectorXd(sum - basis * (basis.transpose() * sum));
+  };
+  const Eigen::VectorXd one = contribution(first), other = contribution(second);
+  return (one + other).norm() < kMostLeft * std::min(one.norm(), other.norm());
+}
+
 /// What is worth its price in the place of a subset, likeliest first.
 std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const CandidateResponses& responses,
@@ -34,7 +60,9 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   std::vector<SearchModel::Entry> exchanges;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return exchanges;
-  const double spent = model.price_of(subset);
+  const bool two_for_one =
+      subset.size() == 2 && take_back_each_other(model, subset.front(), subset.back());
+  const double spent = model.price_of(subset) + (two_for_one ? 2 * kHandicapOfUnnamed : 0);
   const CandidateGains gains(responses, without);
   const Eigen::VectorXd first_order = gains.of_residual();
   const std::vector<Scored> ranked = screen(model.list(), gains, first_order);

@@ -278,7 +278,7 @@ std::vector<double> keep_what_carries(const SearchInput& search, const SearchInp
 
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
                                   Calibration& result) {
-  const VisitLog log = make_visit_log(input.input.run, input.input.description);
+  const VisitLog& log = input.log;
   const Observations observed = observe(input.input.run, log);
   EnlargedParameters start;
   for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
@@ -288,6 +288,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   SearchResult& found = searched.found;
   const auto without_effects = [&]() -> std::optional<WorstError> {
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
+    add_noise(input.noise_follows, {}, result.diagnosis);
     return std::nullopt;
   };
   if (found.evidence.empty()) return without_effects();
@@ -401,6 +402,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     diagnosis.verdict = Verdict::partly_explained;
   }
   diagnosis.axis_test = result.diagnosis.axis_test;
+  add_noise(input.noise_follows, found.fit.parameters, diagnosis);
   diagnosis.reason = reason_of_findings(residual, diagnosis.reason, result.after.fit_pose_rms_mps2);
   result.diagnosis = std::move(diagnosis);
   return worst;
@@ -472,6 +474,7 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   if (!model.unlisted.empty()) terms = smooth_terms(log, SmoothTermSelection::any);
   for (const UnlistedStructure& found : model.unlisted) {
+    if (found.is_of_noise()) continue;  // it is in no mean
     const std::size_t before = parameters.effects.size();
     if (const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape))
       restore(*term, found.axes, found.parameters, parameters);

@@ -6,6 +6,7 @@
 
 #include "estimator/calibrate.h"
 #include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/diagnosis/noise_drivers.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/reml.h"
 #include "estimator/pose_means.h"
@@ -14,12 +15,14 @@ namespace plumbline {
 
 struct ExplainInput {
   const CalibrationInput& input;
+  const VisitLog& log;
+  const std::vector<NoiseDriver>& noise_follows;
   const std::vector<PoseMean>& poses;
   const std::vector<SampleWindow>& windows;
-  const PerAxis<NoiseModel>& noise;         ///< as identified
+  const PerAxis<NoiseModel>& noise;   ///< as identified
   PerAxis<Eigen::VectorXd> known_V2;  ///< variance of each pose by the head's positioning
-  const NoiseProcesses& processes;          ///< of the windows
-  PerAxis<PooledNoise> pooled;              ///< of the pose means beside the 12 parameters
+  const NoiseProcesses& processes;    ///< of the windows
+  PerAxis<PooledNoise> pooled;        ///< of the pose means beside the 12 parameters
 };
 
 /// The largest error on left-out poses after effects were added.

@@ -116,6 +116,8 @@ std::string describe(const FoundEffect& effect) {
 }
 
 std::string describe(const UnlistedStructure& structure) {
+  if (structure.is_of_noise())
+    return "unlisted: the noise follows " + structure.driver + " (" + structure.shape + ")";
   std::string text =
       "unlisted: " + structure.driver + " changes the " + structure.form + " (" + structure.shape;
   for (const EffectParameter& p : structure.parameters)
@@ -257,6 +259,51 @@ void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosi
     attach(filtered.effects[k].parameters, diagnosis.effects[k].parameters);
   for (std::size_t k = 0; k < filtered.unlisted.size(); ++k)
     attach(filtered.unlisted[k].parameters, diagnosis.unlisted[k].parameters);
+}
+
+namespace {
+
+/// Whether something in the model makes readings of an axis scatter more or less than the noise.
+bool changes_scatter(const EnlargedParameters& model, std::size_t axis) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [&](const ActiveEffect& active) {
+    const Effect& effect = *active.effect;
+    const std::vector<std::size_t> axes = axes_of(active);
+    return std::find(axes.begin(), axes.end(), axis) != axes.end() &&
+           (effect.within_dwell() || effect.at_converter() || effect.quiets());
+  });
+}
+
+}  // namespace
+
+void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters& model,
+               Diagnosis& diagnosis) {
+  for (const NoiseDriver& each : follows) {
+    if (changes_scatter(model, each.axis)) continue;
+    const auto like_it = std::find_if(
+        diagnosis.unlisted.begin(), diagnosis.unlisted.end(), [&](const UnlistedStructure& other) {
+          return other.driver == each.driver && other.shape == each.shape;
+        });
+    EffectParameter ratio{"ratio", each.axis, each.ratio, each.u_ratio, ""};
+    if (like_it != diagnosis.unlisted.end()) {
+      like_it->axes.push_back(each.axis);
+      like_it->parameters.push_back(std::move(ratio));
+      like_it->p_value = std::max(like_it->p_value, each.p_value);
+      continue;
+    }
+    diagnosis.unlisted.push_back({each.driver,
+                                  to_string(TermForm::sample),
+                                  {each.axis},
+                                  each.shape,
+                                  {std::move(ratio)},
+                                  each.p_value,
+                                  each.heldout_gain,
+                                  each.sigmas});
+    diagnosis.reason += "; " + describe(diagnosis.unlisted.back());
+    if (diagnosis.verdict == Verdict::clean) {
+      diagnosis.verdict = Verdict::explained;
+      diagnosis.p_value = each.p_value;
+    }
+  }
 }
 
 void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "estimator/calibrate.h"
+#include "estimator/diagnosis/noise_drivers.h"
 #include "estimator/diagnosis/search.h"
 
 namespace plumbline {
@@ -22,5 +23,10 @@ void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosi
 /// each evidence, and the losses of fit without them.
 void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
                   Diagnosis& diagnosis);
+
+/// Adds what the noise follows, but on axes where something in the model that was found changes the
+/// scatter within the dwells by itself.
+void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters& model,
+               Diagnosis& diagnosis);
 
 }  // namespace plumbline

@@ -21,7 +21,7 @@ struct SearchOptions {
   /// The same for a slow effect that is compared with the noise estimated anew under each
   /// hypothesis; on an axis whose converter is coarse, where what is left of rounding follows the
   /// positions and is slow when they are, less.
-  double false_alarm_of_slow = 3e-4;
+  double false_alarm_of_slow = 1e-3;
   double false_alarm_of_slow_when_coarse = 1e-5;
   /// Of a train of pulses where readings hang on the edges of codes: it gathers whatever is odd at
   /// some visits, which is not Gaussian there.
@@ -35,9 +35,9 @@ struct SearchInput {
   const VisitLog& log;
   const Observations& observed;  ///< as measured
   const PerAxis<NoiseModel>& noise;
-  const NoiseProcesses& processes;                 ///< at the n visits
+  const NoiseProcesses& processes;           ///< at the n visits
   const PerAxis<Eigen::VectorXd>& known_V2;  ///< n known variances, V²
-  EnlargedParameters start;                        ///< the 12 parameters, no effects
+  EnlargedParameters start;                  ///< the 12 parameters, no effects
   /// Noise beside the 12 parameters when it is known already; null: the search finds it.
   const PerAxis<PooledNoise>* pooled = nullptr;
 };

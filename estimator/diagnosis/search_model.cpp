@@ -16,26 +16,30 @@ namespace {
 constexpr double kPerAmplitude = 7;  // about 2·ln of the number of poses
 
 /// Whether the time constant of what changes within the dwell is not known to be finite.
-bool lasts(const EnlargedFit& fit, std::size_t effect) {
+bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
+  constexpr double kDwells = 30;  // beyond so many its uncertainty is that of next to nothing
   const ActiveEffect& active = fit.parameters.effects[effect];
   if (!active.effect->within_dwell()) return false;
+  const Visit& visit = log.visits.front();
+  const double longest_s = kDwells * visit.step_s * static_cast<double>(visit.count);
   Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
   for (std::size_t e = 0; e < effect; ++e) row += fit.parameters.effects[e].free_count();
   const auto infos = active.effect->parameters();
   for (std::size_t k = 0; k < infos.size(); ++k) {
-    if (!active.free[k]) continue;
-    if (infos[k].role == ParameterRole::shape && infos[k].unit == "s" &&
-        fit.covariance(row, row) > active.p[k] * active.p[k])
-      return true;
-    ++row;
+    if (infos[k].role == ParameterRole::shape && infos[k].unit == "s") {
+      const double tau_s = active.p[k];
+      if (tau_s > longest_s || (active.free[k] && fit.covariance(row, row) > tau_s * tau_s))
+        return true;
+    }
+    row += active.free[k] ? 1 : 0;
   }
   return false;
 }
 
 /// Of a transient that lasts: it has no more right to a name than what has none, and a time
 /// constant that says nothing.
-double surcharge(const EnlargedFit& fit, std::size_t effect) {
-  return lasts(fit, effect) ? 2 * kHandicapOfUnnamed + kPerAmplitude : 0;
+double surcharge(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
+  return lasts(log, fit, effect) ? 2 * kHandicapOfUnnamed + kPerAmplitude : 0;
 }
 
 /// Whether two models have the same effects on an axis, whatever their sizes.
@@ -91,12 +95,13 @@ double SearchModel::price(std::size_t candidate) const {
 
 double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
   double sum = 0;
-  for (const std::size_t k : effects) sum += price(chosen_[k]) + surcharge(stage_.fit, k);
+  for (const std::size_t k : effects)
+    sum += price(chosen_[k]) + surcharge(input_.log, stage_.fit, k);
   return sum;
 }
 
 double SearchModel::price_in(const EnlargedFit& with, std::size_t candidate) const {
-  return price(candidate) + surcharge(with, with.parameters.effects.size() - 1);
+  return price(candidate) + surcharge(input_.log, with, with.parameters.effects.size() - 1);
 }
 
 double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,

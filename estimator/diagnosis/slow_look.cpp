@@ -148,10 +148,16 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
   const SlowCandidates slow = slow_candidates(input, list, model, looked_at, look);
   std::vector<Scored> ranked = screen_with_own_noise(input, slow, model, plain, rich);
   for (Scored& s : ranked) s.candidate = slow.index[s.candidate];
-  const std::size_t families = ranked.size();
+  // Half of the chance goes to the few with a name, half to the many without.
+  const auto with_name = std::count_if(ranked.begin(), ranked.end(), [&](const Scored& scored) {
+    return list.candidates[scored.candidate].has_name();
+  });
+  const auto named = static_cast<std::size_t>(with_name);
+  const std::size_t unnamed = ranked.size() - named;
   const auto p_of_look = [&](double log_p, std::size_t candidate) {
-    const std::size_t family = list.candidates[candidate].family;
-    return p_of_search(log_p, static_cast<double>(families * list.family_size[family]));
+    const Candidate& c = list.candidates[candidate];
+    const std::size_t like_it = c.has_name() ? named : unnamed;
+    return p_of_search(log_p, static_cast<double>(2 * like_it * list.family_size[c.family]));
   };
   std::erase_if(ranked,
                 [&](const Scored& s) { return p_of_look(s.log_p, s.candidate) > kHopeless; });

@@ -259,8 +259,8 @@ Peak strongest_alias(const Dwells& dwells, double f_hz, double width_hz,
 /// there was begun by the move before, and has one phase in all dwells where they begin at even
 /// times.
 bool is_steady(const Dwells& dwells, const Peak& peak) {
-  constexpr double kClearly = 6;  // standard deviations
-  constexpr double kMuch = 1.4;   // as a ratio
+  constexpr double kClearly = 3.5;  // standard deviations
+  constexpr double kMuch = 1.4;     // as a ratio
   const Eigen::Index half = dwells.off_V.rows() / 2;
   const Eigen::ArrayXcd begins = turning(peak.f_hz, dwells.t_s);
   const auto strength = [&](const Eigen::MatrixXd& part) {
@@ -274,14 +274,15 @@ bool is_steady(const Dwells& dwells, const Peak& peak) {
   return first < kMuch * second || first - second < kClearly * std::hypot(first_sd, second_sd);
 }
 
-/// Whether a line of few periods a dwell has the same phase on every arrival: a course of the
-/// dwells that is no sine, of which the slow contrasts leave what looks like one.
+/// Whether a line of few periods a dwell has the same phase on every arrival, or the opposite one:
+/// a course of the dwells that is no sine, of which the slow contrasts leave what looks like one.
 bool begins_on_arrival(const Dwells& dwells, const Peak& peak) {
-  constexpr double kFewPeriods = 4;
+  constexpr double kFewPeriods = 5;
   constexpr double kAlike = 0.99;
   if (dwells.slow_is_left || peak.f_hz * dwells.dwell_s() > kFewPeriods) return false;
-  const double alike = std::abs(along_columns(dwells.off_V, dwells.step_s, peak.f_hz).sum());
-  return alike > kAlike * std::abs(components(dwells, peak.f_hz).sum());
+  const Eigen::ArrayXcd on_arrival = along_columns(dwells.off_V, dwells.step_s, peak.f_hz);
+  return std::abs(on_arrival.square().sum()) >
+         kAlike * std::abs(components(dwells, peak.f_hz).square().sum());
 }
 
 /// Unless noise shows one as strong somewhere among so many frequencies.

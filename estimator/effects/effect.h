@@ -96,6 +96,8 @@ class Effect {
   virtual double term_g(const TermInput& input, const double* p) const;
   /// Sensor: whether it is a function of what the converter is given, all other terms included.
   virtual bool at_converter() const { return false; }
+  /// Sensor: whether the noise of single readings is smaller where it acts.
+  virtual bool quiets() const { return false; }
   /// Whether it changes while the head rests; course_g() or angle_course() says how.
   virtual bool within_dwell() const { return false; }
   /// Sensor: the term at every sample of the visit, g.

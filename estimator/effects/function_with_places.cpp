@@ -261,10 +261,11 @@ class Bend final : public DrivenTerm {
             place("at"),
             {"p", target().unit(), ParameterRole::amplitude}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     constexpr int kParts = 8;
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
+    if (is_bias_in_disguise(axis)) return starts;
     for (int k = 1; k < kParts; ++k) {
       const double at = low + (high - low) * k / kParts;
       starts.push_back({{low, high, 1, at, target().typical_size()}});

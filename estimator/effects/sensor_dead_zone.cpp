@@ -12,6 +12,7 @@ class DeadZone final : public Effect {
  public:
   std::string id() const override { return "sensor.dead_zone"; }
   Subject subject() const override { return Subject::sensor; }
+  bool quiets() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"w", "g", ParameterRole::shape}};
   }

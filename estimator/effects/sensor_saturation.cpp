@@ -11,6 +11,7 @@ class Saturation final : public Effect {
  public:
   std::string id() const override { return "sensor.saturation"; }
   Subject subject() const override { return Subject::sensor; }
+  bool quiets() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"L", "g", ParameterRole::shape}};
   }

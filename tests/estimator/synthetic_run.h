@@ -24,6 +24,9 @@ struct SyntheticOptions {
   /// Anything else that x does, V, of the specific force in g and the time in s.
   std::function<double(const std::array<double, 3>&, double)> more_x_V = {};
   std::function<double(double)> base_roll_rad = {};  ///< at a time in s
+  /// By how much the noise of x is larger, of the specific force in g and the time since arrival in
+  /// s.
+  std::function<double(const std::array<double, 3>&, double)> noise_x = {};
   /// What is added to δ and to h at a position, degrees.
   std::function<double(double delta_deg, double h_deg)> delta_error_deg = {}, h_error_deg = {};
 };
@@ -51,6 +54,8 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
   result.description.adc = adc;
   const double gamma = 9.8101 / kStandardGravity_mps2;
 
+  bool moving = false;  // the record of 60 s is at rest
+  double arrival_s = 0;
   const auto add_sample = [&](SampleTable& table, double t_s, double to_delta_deg,
                               double to_h_deg) {
     const auto error_deg = [&](const auto& error) {
@@ -71,7 +76,8 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
       double u_V = row[0] * a[0] + row[1] * a[1] + row[2] * a[2] + row[3];
       if (axis == 0) u_V += options.k2_x_V_per_g2 * a[0] * a[0];
       if (axis == 0 && options.more_x_V) u_V += options.more_x_V(a, t_s);
-      u_V += options.sigma_V * normal(random);
+      const bool noisy = axis == 0 && options.noise_x && moving;
+      u_V += options.sigma_V * (noisy ? options.noise_x(a, t_s - arrival_s) : 1) * normal(random);
       table.u_V[axis].push_back(adc.min_V +
                                 adc.lsb_V() * std::round((u_V - adc.min_V) / adc.lsb_V()));
     }
@@ -88,6 +94,8 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
     const std::size_t count = options.samples_per_pose / half;
     result.run.poses.push_back({std::ssize(result.run.poses), static_cast<double>(delta),
                                 static_cast<double>(h), result.run.samples.size(), count});
+    moving = true;
+    arrival_s = t_s;
     for (std::size_t i = 0; i < count; ++i)
       add_sample(result.run.samples, t_s + static_cast<double>(i) / kRate_hz, delta, h);
     t_s += 3;

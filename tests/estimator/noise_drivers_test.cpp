@@ -1,0 +1,107 @@
+// Noise that follows something shows in no mean: it is told by the scatter within the dwells.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/calibrate.h"
+#include "tests/estimator/synthetic_run.h"
+
+namespace plumbline {
+namespace {
+
+using testing::IsEmpty;
+
+const Adc kFineConverter{16, -5.0, 0.0};
+
+SyntheticOptions fine_grid() {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  return options;
+}
+
+Calibration calibration_of(const SyntheticRun& data) {
+  return calibrate({data.run, &data.still, data.description}, {});
+}
+
+void expect_noise_of_x(const Calibration& result, const char* driver, const char* shape,
+                       double ratio) {
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::explained);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, driver);
+  EXPECT_EQ(found.form, "sample");
+  EXPECT_EQ(found.shape, shape);
+  EXPECT_EQ(found.axes, std::vector<std::size_t>{0});
+  EXPECT_LT(found.p_value, 1e-4);
+  EXPECT_GT(found.heldout_gain, 0.5);
+  ASSERT_EQ(found.parameters.size(), 1U);
+  EXPECT_NEAR(found.parameters[0].value, ratio, 5 * found.parameters[0].u);
+}
+
+TEST(NoiseDrivers, NoiseThatGrowsWithWhatTheAxisFeels) {
+  SyntheticOptions options = fine_grid();
+  options.noise_x = [](const auto& a_g, double) { return std::exp(0.7 * std::abs(a_g[0])); };
+  const SyntheticRun data = synthetic_run(3, kFineConverter, options);
+  const Calibration result = calibration_of(data);
+  expect_noise_of_x(result, "a_x", "noise, straight line in its size", std::exp(0.7));
+  // It is in no mean, so another set lacks nothing of the model.
+  EXPECT_THAT(evaluate(certified_model(result), data.run, data.description).left_out, IsEmpty());
+}
+
+TEST(NoiseDrivers, NoiseThatEveryArrivalBringsAlong) {
+  SyntheticOptions options = fine_grid();
+  options.noise_x = [](const auto&, double since_s) { return since_s < 0.05 ? 2 : 1; };
+  expect_noise_of_x(calibration_of(synthetic_run(4, kFineConverter, options)), "t_in_pose",
+                    "noise, first quarter against the rest", 2);
+}
+
+// Poses with less noise say more: with all alike the parameters err by half as much again.
+TEST(NoiseDrivers, QuietPosesCountForMore) {
+  SyntheticOptions options = fine_grid();
+  options.noise_x = [](const auto& a_g, double) { return std::exp(3 * std::abs(a_g[0])); };
+  double square = 0, expected = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const SyntheticRun data = synthetic_run(seed, kFineConverter, options);
+    const AxisEstimate x = calibration_of(data).estimates.batch_ls[0];
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      square +=
+          std::pow(x.value(k) - data.truth[0][static_cast<std::size_t>(k)], 2) / x.covariance(k, k);
+      ++expected;
+    }
+  }
+  EXPECT_GT(square / expected, 0.5);
+  EXPECT_LT(square / expected, 1.6);
+}
+
+TEST(NoiseDrivers, NoiseThatFollowsNothingHasNoDriver) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const Calibration result = calibration_of(synthetic_run(seed, kFineConverter));
+    EXPECT_THAT(result.diagnosis.unlisted, IsEmpty()) << seed << result.diagnosis.reason;
+  }
+}
+
+// Beyond its limit an axis is quiet.
+TEST(NoiseDrivers, ALimitExplainsItsQuietReadings) {
+  constexpr std::uint64_t kSeed = 5;
+  constexpr double kLimit_g = 0.7;
+  SyntheticOptions options = fine_grid();
+  const auto x = synthetic_run(kSeed, kFineConverter, options).truth[0];
+  const auto clipped_g = [=](const auto& a_g) {
+    const double response_g = (x[0] * a_g[0] + x[1] * a_g[1] + x[2] * a_g[2]) / x[0];
+    return std::clamp(response_g, -kLimit_g, kLimit_g) - response_g;
+  };
+  options.more_x_V = [x, clipped_g](const auto& a_g, double) { return x[0] * clipped_g(a_g); };
+  options.noise_x = [clipped_g](const auto& a_g, double) { return clipped_g(a_g) == 0 ? 1 : 0.2; };
+  const Calibration result = calibration_of(synthetic_run(kSeed, kFineConverter, options));
+  SCOPED_TRACE(result.diagnosis.reason);
+  ASSERT_EQ(result.diagnosis.effects.size(), 1U);
+  EXPECT_EQ(result.diagnosis.effects[0].id, "sensor.saturation");
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+}
+
+}  // namespace
+}  // namespace plumbline
