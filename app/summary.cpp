@@ -145,10 +145,10 @@ std::string summary(const RunDescription& description, const Calibration& calibr
   text += error_rows(calibration, verification);
   text += fmt::format("diagnosis: {}: {}\n", to_string(calibration.diagnosis.verdict),
                       calibration.diagnosis.reason);
-  for (const FoundEffect& effect : calibration.diagnosis.effects) {
-    if (!effect.separate_by.empty())
-      text += fmt::format("to tell {} apart: {}{}\n", effect.id, effect.separate_by,
-                          effect.separating_plan.stops.empty() ? "" : " (separate.csv)");
+  for (const auto& [name, ambiguity] : calibration.diagnosis.findings()) {
+    if (!ambiguity.separate_by.empty())
+      text += fmt::format("to tell {} apart: {}{}\n", name, ambiguity.separate_by,
+                          ambiguity.separating_plan.stops.empty() ? "" : " (separate.csv)");
   }
   const Decision& decision = calibration.decision;
   const bool withheld = decision.status == DecisionStatus::none && decision.limit_mps2 > 0;

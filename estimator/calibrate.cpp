@@ -24,6 +24,7 @@
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/identify.h"
 #include "estimator/noise/longest_stretch.h"
+#include "estimator/noise/powers_allowance.h"
 #include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
 #include "estimator/quantization/quantized_axis.h"

@@ -91,22 +91,26 @@ struct SeparatingPlan {
   double decides_sigma = 0;   ///< expected distance of the nearest rival, standard deviations
 };
 
+/// What these data cannot tell a finding from, and what would.
+struct Ambiguity {
+  std::vector<std::string> alternatives;  ///< listed effects and sums of them
+  std::string separate_by;                ///< words
+  SeparatingPlan separating_plan;  ///< no stops: nothing to decide, or poses do not decide it
+};
+
 /// An effect that the 12-parameter model lacks and the data show.
-struct FoundEffect {
+struct FoundEffect : Ambiguity {
   std::string id;
   std::vector<std::size_t> axes;
   std::vector<EffectParameter> parameters;
   double p_value = 1;
   double heldout_gain = 0;
-  std::vector<std::string> alternatives;
-  std::string separate_by;              ///< words
-  SeparatingPlan separating_plan = {};  ///< no stops: nothing to decide, or poses do not decide it
-  std::string definition = {};          ///< of an effect that a user described, as they wrote it
+  std::string definition = {};  ///< of an effect that a user described, as they wrote it
   double sigmas = 0;  ///< the loss of fit without it, as that of a single Gaussian quantity
 };
 
 /// Structure that no listed effect explains.
-struct UnlistedStructure {
+struct UnlistedStructure : Ambiguity {
   std::string driver;
   std::string form;  ///< bias, scale, geometry or sample
   std::vector<std::size_t> axes;
@@ -138,6 +142,13 @@ struct Diagnosis {
   std::vector<UnlistedStructure> unlisted;
   std::vector<DetectionLimit> not_found;  ///< every effect that could have been found and was not
   RunHistory history;                     ///< where something was found that remembers it
+
+  /// All findings with what they could be as well; name: the id, or the driver without one.
+  struct Finding {
+    std::string name;
+    const Ambiguity& ambiguity;
+  };
+  std::vector<Finding> findings() const;
 };
 
 /// Input-referred errors in m/s² (volts / K_ii · g_n).

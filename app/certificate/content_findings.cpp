@@ -86,18 +86,21 @@ void add_terms(const Composer& c) {
 void add_alternatives(const Composer& c) {
   const Diagnosis& diagnosis = c.input.calibration.diagnosis;
   Facts facts;
-  for (const FoundEffect& effect : diagnosis.effects) {
+  const auto add = [&](const std::string& name, const Ambiguity& ambiguity) {
     std::string others;
-    for (const std::string& other : effect.alternatives) {
+    for (const std::string& other : ambiguity.alternatives) {
       others += (others.empty() ? "" : "; ") + effect_name(other, c.tr) + " (" + other + ")";
     }
     std::string text = others.empty() ? c.tr("nothing else explains the data as well")
                                       : c.tr("these data do not tell it from: {}", others);
-    if (!effect.separate_by.empty()) {
-      text += ". " + c.tr("To tell them apart: {}", c.tr.phrase(effect.separate_by));
+    if (!ambiguity.separate_by.empty()) {
+      text += ". " + c.tr("To tell them apart: {}", c.tr.phrase(ambiguity.separate_by));
     }
-    facts.rows.push_back({effect_name(effect.id, c.tr), text});
-  }
+    facts.rows.push_back({name, text});
+  };
+  for (const FoundEffect& effect : diagnosis.effects) add(effect_name(effect.id, c.tr), effect);
+  for (const UnlistedStructure& found : diagnosis.unlisted)
+    if (!found.alternatives.empty()) add(unlisted_name(found, c.tr), found);
   if (facts.rows.empty()) return;
   c.add(Paragraph{c.tr("What could not be told apart:")});
   c.add(std::move(facts));

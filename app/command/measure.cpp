@@ -97,8 +97,8 @@ Result<std::vector<PlanStep>> poses_that_decide(const MeasureRequest& request, s
   if (auto added = add_own_effects(request.effects, *job); !added) return fail(added.error());
   const Calibration calibration = calibrate_job(*job);
   auto steps = separating_steps(calibration.diagnosis, request.session.rig.plan.samples_per_pose);
-  for (const FoundEffect& effect : calibration.diagnosis.effects) {
-    if (!effect.separate_by.empty()) fmt::print(stderr, "{}: {}\n", effect.id, effect.separate_by);
+  for (const auto& [name, ambiguity] : calibration.diagnosis.findings()) {
+    if (!ambiguity.separate_by.empty()) fmt::print(stderr, "{}: {}\n", name, ambiguity.separate_by);
   }
   fmt::print(stderr, "separate: {}\n",
              steps.empty() ? std::string("no further poses are needed, or none would decide")

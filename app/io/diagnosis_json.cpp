@@ -43,7 +43,9 @@ Json to_json(const UnlistedStructure& structure) {
           {"shape", structure.shape},
           {"parameters", json_parameters(structure.parameters)},
           {"p_value", json_number(structure.p_value)},
-          {"heldout_gain", json_number(structure.heldout_gain)}};
+          {"heldout_gain", json_number(structure.heldout_gain)},
+          {"alternatives", structure.alternatives},
+          {"separate_by", structure.separate_by}};
 }
 
 Json to_json(const DetectionLimit& limit) {

@@ -89,8 +89,8 @@ HeadReach reach_of(const RigDescription& rig) {
 
 std::vector<PlanStep> separating_steps(const Diagnosis& diagnosis, int samples_per_pose) {
   std::vector<PlanStep> steps;
-  for (const FoundEffect& effect : diagnosis.effects) {
-    const SeparatingPlan& plan = effect.separating_plan;
+  for (const auto& [name, ambiguity] : diagnosis.findings()) {
+    const SeparatingPlan& plan = ambiguity.separating_plan;
     for (const SeparatingPlan::Stop& stop : plan.stops)
       steps.push_back({std::ssize(steps),
                        storage::PoseKind::grid,

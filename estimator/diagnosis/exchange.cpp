@@ -81,7 +81,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
     if (!(cost < now - kClearly)) continue;
     const double p = model.p_of(model.log_p_of(index, without, with, gains.dof(index)));
-    if (p <= model.options().false_alarm) exchanges.push_back({index, p, with.parameters});
+    if (p <= model.false_alarm(candidate)) exchanges.push_back({index, p, with.parameters});
   }
   return exchanges;
 }
@@ -198,7 +198,8 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
     best_score = score;
     best = {{index, model.p_of(log_p), with.parameters}, std::move(with)};
   }
-  if (best && best->entry.p > model.options().false_alarm) best.reset();
+  if (best && best->entry.p > model.false_alarm(model.list().candidates[best->entry.candidate]))
+    best.reset();
   return best;
 }
 

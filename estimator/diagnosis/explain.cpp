@@ -13,6 +13,7 @@
 #include "estimator/diagnosis/separation.h"
 #include "estimator/diagnosis/stuck_bits.h"
 #include "estimator/diagnosis/verdict.h"
+#include "estimator/diagnosis/wander.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/smooth_term.h"
@@ -274,6 +275,14 @@ std::vector<double> keep_what_carries(const SearchInput& search, const SearchInp
   return gains;
 }
 
+/// Wandering of the bias that nobody has put into words.
+std::vector<NoiseDriver> wanders(const SearchInput& search, const SearchResult& found) {
+  std::vector<NoiseDriver> all;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (auto wander = wander_beyond_record(search, found, axis)) all.push_back(std::move(*wander));
+  return all;
+}
+
 }  // namespace
 
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -289,6 +298,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const auto without_effects = [&]() -> std::optional<WorstError> {
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
     add_noise(input.noise_follows, {}, result.diagnosis);
+    add_noise(wanders(search, found), {}, result.diagnosis);
     return std::nullopt;
   };
   if (found.evidence.empty()) return without_effects();
@@ -403,6 +413,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   }
   diagnosis.axis_test = result.diagnosis.axis_test;
   add_noise(input.noise_follows, found.fit.parameters, diagnosis);
+  add_noise(wanders(search, found), {}, diagnosis);
   diagnosis.reason = reason_of_findings(residual, diagnosis.reason, result.after.fit_pose_rms_mps2);
   result.diagnosis = std::move(diagnosis);
   return worst;

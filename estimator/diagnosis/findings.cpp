@@ -67,20 +67,18 @@ struct Rivals {
   Separation separation;
 };
 
-/// Of each effect in `search` that has any.
+/// Of each effect in `search`.
 std::vector<Rivals> all_rivals(const SearchInput& input, const CandidateList& list,
                                const SearchResult& search, const HeadReach& reach) {
   std::vector<Rivals> rivals(search.evidence.size());
   parallel_for(rivals.size(), [&](std::size_t e) {
-    const Effect& effect = *search.evidence[e].candidate.effect;
-    if (dynamic_cast<const SmoothTerm*>(&effect) != nullptr) return;
     rivals[e].alternatives = find_alternatives(input, list, search, e);
     rivals[e].separation = separate(input, search, e, rivals[e].alternatives, reach);
   });
   return rivals;
 }
 
-void add_rivals(const Rivals& rivals, FoundEffect& entry) {
+void add_rivals(const Rivals& rivals, Ambiguity& entry) {
   for (const Alternative& rival : rivals.alternatives) {
     auto& names = entry.alternatives;
     if (std::find(names.begin(), names.end(), rival.name) == names.end())
@@ -182,8 +180,14 @@ Reported report(const VisitLog& log, const EnlargedEstimate& estimate) {
     std::vector<EffectParameter> parameters = report_parameters(log, estimate, e);
     if (places[e].unlisted) {
       const auto* term = dynamic_cast<const SmoothTerm*>(active.effect);
-      reported.unlisted.push_back({term->driver(), to_string(term->form()), axes_of(active),
-                                   term->shape(), std::move(parameters), 1, 0});
+      reported.unlisted.push_back({{},
+                                   term->driver(),
+                                   to_string(term->form()),
+                                   axes_of(active),
+                                   term->shape(),
+                                   std::move(parameters),
+                                   1,
+                                   0});
       continue;
     }
     if (places[e].index == reported.effects.size()) {
@@ -227,6 +231,7 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
     const double p_value = search.evidence[e].p_value;
     if (places[e].unlisted) {
       unlisted[places[e].index].p_value = p_value;
+      add_rivals(rivals[e], unlisted[places[e].index]);
       continue;
     }
     FoundEffect& entry = effects[places[e].index];
@@ -290,8 +295,9 @@ void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters
       like_it->p_value = std::max(like_it->p_value, each.p_value);
       continue;
     }
-    diagnosis.unlisted.push_back({each.driver,
-                                  to_string(TermForm::sample),
+    diagnosis.unlisted.push_back({{},
+                                  each.driver,
+                                  to_string(each.at_random ? TermForm::bias : TermForm::sample),
                                   {each.axis},
                                   each.shape,
                                   {std::move(ratio)},
@@ -299,10 +305,11 @@ void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters
                                   each.heldout_gain,
                                   each.sigmas});
     diagnosis.reason += "; " + describe(diagnosis.unlisted.back());
-    if (diagnosis.verdict == Verdict::clean) {
+    if (diagnosis.verdict == Verdict::clean) diagnosis.p_value = each.p_value;
+    if (each.at_random)
+      diagnosis.verdict = Verdict::partly_explained;
+    else if (diagnosis.verdict == Verdict::clean)
       diagnosis.verdict = Verdict::explained;
-      diagnosis.p_value = each.p_value;
-    }
   }
 }
 

@@ -23,6 +23,8 @@ struct NoiseDriver {
   double u_ratio = 0;
   /// Variance that the mean of each visit has beyond that of a visit as quiet as the quietest, V².
   Eigen::VectorXd excess_V2 = {};
+  /// Whether that it changes with the driver is all that is known of it.
+  bool at_random = false;
 };
 
 /// The likeliest for each axis, if chance would not show as much in one of 10⁴ sets and the noise

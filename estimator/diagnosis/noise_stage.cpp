@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "estimator/fit/rounding.h"
+#include "estimator/noise/powers_allowance.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {

@@ -120,9 +120,9 @@ void tell_in_one(SearchModel& model) {
       const std::vector<std::size_t> steps = of_regular_steps(model, first.axis);
       const auto first_step = std::find_if(
           steps.begin(), steps.end(), [&](std::size_t l) { return is_step(model.candidate(l)); });
+      // A train of which the run saw one pulse is still to be told.
       if (k == *first_step && steps.size() > 1 && put_train_in_place_of(model, steps, first.axis))
-        return;
-      continue;
+        return tell_in_one(model);
     }
     std::vector<std::size_t> instances;
     std::vector<std::vector<double>> p;

@@ -94,6 +94,11 @@ class Search {
       model_.set_looks(effective_looks(gains, list_.candidates.size(),
                                        model_.stage().fit.whitened_residual.size(), options_.seed,
                                        options_.replicates));
+    std::erase_if(ranked, [&](const Scored& s) {
+      const double false_alarm = model_.false_alarm(list_.candidates[s.candidate]);
+      return false_alarm < options_.false_alarm && model_.p_of(s.log_p) > false_alarm;
+    });
+    if (ranked.empty()) return false;
     const auto surest =
         std::min_element(ranked.begin(), ranked.end(),
                          [](const Scored& a, const Scored& b) { return a.log_p < b.log_p; });
@@ -130,7 +135,8 @@ class Search {
     }
     if (winner == nullptr) return replace_overlapping(ranked, gains);
     const double p = model_.p_of(winner_log_p);
-    return p <= options_.false_alarm && model_.add({winner->candidate, p, with_winner});
+    return p <= model_.false_alarm(list_.candidates[winner->candidate]) &&
+           model_.add({winner->candidate, p, with_winner});
   }
 
   /// A slow effect that the noise was estimated without is partly taken for slow noise, and then
@@ -171,7 +177,8 @@ class Search {
         if (!with.determined) continue;
         const double p =
             model_.p_of(model_.log_p_of(candidate, model_.stage().fit, with, gains.dof(candidate)));
-        if (p <= options_.false_alarm && model_.exchange({k}, {candidate, p, with.parameters}))
+        if (p <= model_.false_alarm(list_.candidates[candidate]) &&
+            model_.exchange({k}, {candidate, p, with.parameters}))
           return true;
       }
     }

@@ -36,10 +36,30 @@ bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
   return false;
 }
 
-/// Of a transient that lasts: it has no more right to a name than what has none, and a time
-/// constant that says nothing.
+/// Share of the visits to which the spindle came by another tilt than the one before, where these
+/// are few and `effect` sets in at one of them; 1 elsewhere.
+double coincidence(const VisitLog& log, const ActiveEffect& active) {
+  constexpr double kFew = 0.1;
+  const auto sets_in = active.effect->sets_in_at(log, active.p);
+  if (!sets_in || *sets_in == 0) return 1;
+  const auto is_tilted_anew = [&](std::size_t visit) {
+    constexpr double kStill_rad = 1e-4;
+    return std::abs(log.visits[visit].h_rad - log.visits[visit - 1].h_rad) > kStill_rad;
+  };
+  if (!is_tilted_anew(*sets_in)) return 1;
+  double tilted_anew = 0;
+  for (std::size_t k = 1; k < log.visits.size(); ++k) tilted_anew += is_tilted_anew(k) ? 1 : 0;
+  const double share = tilted_anew / static_cast<double>(log.visits.size());
+  return share < kFew ? share : 1;
+}
+
+/// What an effect of a model must gain besides its price. A transient that lasts has no more right
+/// to a name than what has none, and a time constant that says nothing. What happened just when the
+/// tilt changed is more likely a function of the tilt.
 double surcharge(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
-  return lasts(log, fit, effect) ? 2 * kHandicapOfUnnamed + kPerAmplitude : 0;
+  if (lasts(log, fit, effect)) return 2 * kHandicapOfUnnamed + kPerAmplitude;
+  const double chance = coincidence(log, fit.parameters.effects[effect]);
+  return chance < 1 ? 2 * (kHandicapOfUnnamed - std::log(chance)) : 0;
 }
 
 /// Whether two models have the same effects on an axis, whatever their sizes.
@@ -78,11 +98,26 @@ bool SearchModel::is_dropped(const Candidate& candidate) const {
 
 double SearchModel::p_of(double log_p_local) const { return p_of_search(log_p_local, looks_); }
 
+bool SearchModel::shows_steps(std::size_t axis) const {
+  constexpr double kFew = 0.5;  // of a step: with more noise the edges are washed out
+  const auto& lattice = input_.log.codes[axis].coarser_lattice;
+  return lattice && input_.log.input_sd_V[axis] < kFew * lattice->step_V;
+}
+
+double SearchModel::false_alarm(const Candidate& candidate) const {
+  const bool of_head = candidate.effect->subject() == Subject::head;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if ((of_head || axis == candidate.axis) && shows_steps(axis))
+      return std::min(options_.false_alarm, options_.false_alarm_at_steps);
+  return options_.false_alarm;
+}
+
 PerAxis<double> SearchModel::false_alarm_of_slow() const {
   PerAxis<double> share;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    share[axis] = stage_.coarse[axis] ? options_.false_alarm_of_slow_when_coarse
-                                      : options_.false_alarm_of_slow;
+    share[axis] = shows_steps(axis)     ? options_.false_alarm_at_steps
+                  : stage_.coarse[axis] ? options_.false_alarm_of_slow_when_coarse
+                                        : options_.false_alarm_of_slow;
   return share;
 }
 
@@ -278,7 +313,7 @@ void SearchModel::drop_superfluous() {
   for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
     if (is_certain(candidate(k))) continue;
     const EnlargedFit without = fit_without({k});
-    if (!without.determined || p_of_removal(without) < options_.false_alarm) continue;
+    if (!without.determined || p_of_removal(without) < false_alarm(candidate(k))) continue;
     if (!adopt(without.parameters)) continue;
     dropped_.push_back(candidate(k).family);
     forget(k);

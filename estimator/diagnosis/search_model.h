@@ -39,7 +39,8 @@ class SearchModel {
   double looks() const { return looks_; }
   void set_looks(double looks) { looks_ = looks; }
   double p_of(double log_p_local) const;
-  /// What counts as significant among the slow candidates of each axis.
+  /// What counts as significant: of a candidate, and among the slow ones of each axis.
+  double false_alarm(const Candidate& candidate) const;
   PerAxis<double> false_alarm_of_slow() const;
   /// log of the probability that noise alone gives a candidate what it gains over the fit `before`
   /// it. A single reading of a coarse converter strays further than Gaussian noise, but by no more
@@ -84,6 +85,7 @@ class SearchModel {
   SearchResult take_result();
 
  private:
+  bool shows_steps(std::size_t axis) const;
   bool adopt(const EnlargedParameters& parameters);
   void look_closer();
   void leave_ties_open();

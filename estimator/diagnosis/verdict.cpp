@@ -43,6 +43,13 @@ const char* to_string(Verdict verdict) {
   return "undetermined";
 }
 
+std::vector<Diagnosis::Finding> Diagnosis::findings() const {
+  std::vector<Finding> all;
+  for (const FoundEffect& effect : effects) all.push_back({effect.id, effect});
+  for (const UnlistedStructure& structure : unlisted) all.push_back({structure.driver, structure});
+  return all;
+}
+
 bool is_unexplained(const VerdictInput& input, std::size_t axis) {
   return input.poses >= kFewestPosesToDecide && obstacle(input, axis).empty() &&
          input.axis[axis].p_value < kFalseAlarmShare / static_cast<double>(kAxisCount);

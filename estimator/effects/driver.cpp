@@ -28,6 +28,18 @@ std::vector<double> specific_force_component_g(const VisitLog& log, std::size_t 
   return a_g;
 }
 
+/// What a component of the specific force changed by on the way to each visit: nothing after a long
+/// rest, so that the 12 parameters are those of rest.
+PerAxis<std::vector<double>> changes_g(const VisitLog& log) {
+  PerAxis<std::vector<double>> change_g;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const std::vector<double> a_g = specific_force_component_g(log, i);
+    for (std::size_t k = 0; k < a_g.size(); ++k)
+      change_g[i].push_back(log.before(k) ? a_g[k] - a_g[k - 1] : 0.0);
+  }
+  return change_g;
+}
+
 // Slope between the neighbours of a visit, per hour.
 std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& value) {
   std::vector<double> rate(value.size());
@@ -104,18 +116,14 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; });
   add("delta_deg", [&](std::size_t k) { return visits[k].delta_rad; }).angle = true;
   add("h_deg", [&](std::size_t k) { return visits[k].h_rad; });
-  PerAxis<std::vector<double>> a_g, change_g;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    a_g[i] = specific_force_component_g(log, i);
-    for (std::size_t k = 0; k < a_g[i].size(); ++k)
-      change_g[i].push_back(log.before(k) ? a_g[i][k] - a_g[i][k - 1] : 0.0);
-    drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g[i], a_g[i], a_g[i]}});
+    const std::vector<double> a_g = specific_force_component_g(log, i);
+    drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g, a_g, a_g}});
     drivers.back().in_the_twelve = true;
     drivers.back().component = i;
   }
-  // Nothing after a long rest, so that the 12 parameters are those of rest.
-  drivers.push_back({"previous_pose", "change of a_i since", change_g});
-  drivers.back().span = about_zero(change_g);
+  drivers.push_back({"previous_pose", "change of a_i since", changes_g(log)});
+  drivers.back().span = about_zero(drivers.back().value);
   // What only a direction decides is the simpler where an order of visits tells no more.
   for (const std::size_t way : {std::size_t{0}, std::size_t{1}}) {
     Driver& direction = add("previous_pose", [&, way](std::size_t k) {
@@ -145,6 +153,22 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
     add(column.name, [&](std::size_t k) { return column.value[k]; }).recorded = true;
     const std::vector<double> rate = rate_per_h(log, column.value);
     add(column.name + ".rate", [&](std::size_t k) { return rate[k]; }).recorded = true;
+  }
+  return drivers;
+}
+
+std::vector<Driver> changes_of_others(const VisitLog& log) {
+  const PerAxis<std::vector<double>> change_g = changes_g(log);
+  std::vector<Driver> drivers;
+  for (std::size_t other = 1; other < kAxisCount; ++other) {
+    Driver& driver = drivers.emplace_back(
+        Driver{"previous_pose",
+               other == 1 ? "change of the component of the next axis since"
+                          : "change of the component of the axis after the next since",
+               {}});
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      driver.value[i] = change_g[(i + other) % kAxisCount];
+    driver.span = about_zero(driver.value);
   }
   return drivers;
 }

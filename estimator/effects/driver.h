@@ -39,6 +39,10 @@ using DriverPointer = std::shared_ptr<const Driver>;
 /// change.
 std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 
+/// By how much the components of the next axis and of the one after that changed on the way from
+/// the previous pose, under the name of what came before.
+std::vector<Driver> changes_of_others(const VisitLog& log);
+
 /// The specific force of the own axis, under the name of what came before: for what follows it.
 Driver load(const VisitLog& log);
 

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -104,6 +105,11 @@ class Effect {
   virtual Eigen::VectorXd course_g(const TermInput& input, const double* p) const;
   /// Head, within the dwell: that of which displace() adds the mean.
   virtual AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const;
+  /// The visit with the beginning of which it sets in for good, if it is one that does.
+  virtual std::optional<std::size_t> sets_in_at(const VisitLog&,
+                                                const std::vector<double>& /*p*/) const {
+    return {};
+  }
   /// Whether it depends on earlier visits, or on what was recorded then.
   virtual bool remembers() const { return false; }
   /// Whether its response at a visit before which nothing is recorded is a guess that no parameter

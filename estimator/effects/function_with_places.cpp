@@ -29,12 +29,16 @@ class Bell final : public DrivenTerm {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
     if (is_sparse()) {
-      const std::set<double> places(variable().value[0].begin(), variable().value[0].end());
-      const double apart =
-          (high - low) / static_cast<double>(std::max<std::size_t>(1, places.size() - 1));
-      for (const double middle : places)
-        for (const double share : {0.4, 0.8})
-          starts.push_back({{middle, share * apart, target().typical_size()}});
+      const std::vector<double> places = values_seen();
+      for (std::size_t k = 0; k < places.size(); ++k)
+        for (const double share : {0.4, 0.8, 1.6}) {
+          const auto add = [&](double middle) {
+            starts.push_back({{middle, share * spacing(), target().typical_size()}});
+          };
+          add(places[k]);
+          // One that is seen at two of them at least.
+          if (share > 0.5 && k + 1 < places.size()) add(0.5 * (places[k] + places[k + 1]));
+        }
       return starts;
     }
     for (const double share : {1.0 / 60, 1.0 / 30, 1.0 / 15}) {
@@ -47,11 +51,29 @@ class Bell final : public DrivenTerm {
     return starts;
   }
 
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    std::vector<Hypothesis> others;
+    if (!is_sparse() || found.p[1] < 0.5 * spacing()) return others;
+    for (const double away : {-0.4, -0.2, 0.0, 0.2, 0.4})
+      for (const double ratio : {0.6, 0.8, 1.0, 1.25, 1.6})
+        others.push_back({{found.p[0] + away * spacing(), ratio * found.p[1], found.p[2]}});
+    return others;
+  }
+
  private:
   /// Whether a bell may stand between two of its values, where nothing tells its height.
   bool is_sparse() const {
     constexpr int kDense = 12;
     return !resolves(kDense);
+  }
+  std::vector<double> values_seen() const {
+    const std::set<double> values(variable().value[0].begin(), variable().value[0].end());
+    return {values.begin(), values.end()};
+  }
+  double spacing() const {
+    const auto [low, high] = range();
+    return (high - low) / static_cast<double>(std::max<std::size_t>(1, values_seen().size() - 1));
   }
   std::string function() const override { return "bell"; }
   double at(double value, const double* p) const override {
@@ -177,6 +199,67 @@ class Pulses final : public DrivenTerm {
         found.push_back({{edge(), period, share * period, fall + side * share * period,
                           target().typical_size()}});
     return found;
+  }
+};
+
+class Window final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    // Between two visits nothing moves a sharp edge.
+    return {{"from", "s", ParameterRole::index},
+            {"to", "s", ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  /// Few: two steps that cancel, or a train, lead to all others.
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    const double width = 0.15 * (high - low);
+    std::vector<Hypothesis> starts;
+    for (double from = low; from + width < high; from += 0.5 * width)
+      starts.push_back(half_way(from, from + width, target().typical_size()));
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 4;
+    const double spacing = 4 * part_of_spacing();
+    std::vector<Hypothesis> others;
+    for (int from = -kPlaces; from <= kPlaces; ++from)
+      for (int to = -kPlaces; to <= kPlaces; ++to)
+        others.push_back(
+            half_way(found.p[0] + spacing * from, found.p[1] + spacing * to, found.p[2]));
+    return others;
+  }
+  /// A step and one back, or a train of which the run saw one pulse.
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& steps) const override {
+    if (dynamic_cast<const Pulses*>(&repeated) != nullptr && repeated.id() == id()) {
+      const std::vector<double>& train = steps.front();
+      return {half_way(train[3] - 0.5 * train[2], train[3] + 0.5 * train[2], train[4])};
+    }
+    if (repeated.id() != "sensor.bias_step" || steps.size() != 2) return {};
+    const bool in_order = steps[0][1] < steps[1][1];
+    const std::vector<double>&first = steps[in_order ? 0 : 1], &second = steps[in_order ? 1 : 0];
+    if (!(first[0] * second[0] < 0)) return {};
+    return {half_way(first[1], second[1], first[0])};
+  }
+
+ private:
+  std::string function() const override { return "window"; }
+  double at(double value, const double* p) const override {
+    return value > p[0] && value < p[1] ? p[2] : 0;
+  }
+  /// Edges half way between the visits that these times lie between.
+  Hypothesis half_way(double from, double to, double size) const {
+    const auto moved = [this](double time) {
+      const std::vector<double>& times = variable().value[0];
+      const auto after = std::upper_bound(times.begin(), times.end(), time);
+      if (after == times.begin() || after == times.end()) return time;
+      return 0.5 * (*(after - 1) + *after);
+    };
+    return {{moved(from), moved(to), size}};
   }
 };
 
@@ -314,10 +397,10 @@ class Step final : public DrivenTerm {
     int parts = 12;
     // A large one is wrong by much at every visit between it and the place tried.
     if (sharp) {
-      constexpr int kVisits = 2;
+      const int visits = target().other == 0 ? 2 : 4;
       const bool clock = variable().is_clock();
       widths = {clock ? part_of_spacing() : 0.01 * (high - low)};
-      parts = clock ? static_cast<int>(variable().value[0].size()) / kVisits : 32;
+      parts = clock ? static_cast<int>(variable().value[0].size()) / visits : 32;
     }
     std::vector<Hypothesis> starts;
     for (const double width : widths)
@@ -405,6 +488,10 @@ std::unique_ptr<SmoothTerm> saw_tooth(DriverPointer driver, const Target& target
 bool is_saw_tooth(const Effect& effect) {
   return dynamic_cast<const SawTooth*>(&effect) != nullptr;
 }
+std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target) {
+  return std::make_unique<Window>(std::move(clock), target);
+}
+
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
   return std::make_unique<Pulses>(std::move(driver), target);
 }

@@ -23,6 +23,10 @@ class IndexSlip final : public Effect {
                 HeadGeometry& head) const override {
     if (static_cast<double>(visit) >= p[1]) head.delta_rad += p[0] * effect::kRadPerDeg;
   }
+  std::optional<std::size_t> sets_in_at(const VisitLog&,
+                                        const std::vector<double>& p) const override {
+    return static_cast<std::size_t>(p[1]);
+  }
   bool carries_over() const override { return false; }
 };
 

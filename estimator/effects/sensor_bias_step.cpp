@@ -38,6 +38,12 @@ class BiasStep final : public Effect {
     }
     return within;
   }
+  std::optional<std::size_t> sets_in_at(const VisitLog& log,
+                                        const std::vector<double>& p) const override {
+    for (std::size_t k = 0; k < log.visits.size(); ++k)
+      if (log.visits[k].t_arrival_s == p[1]) return k;
+    return {};
+  }
   double term_g(const TermInput& input, const double* p) const override {
     return p[0] * share_from(input.at(), p[1]);
   }

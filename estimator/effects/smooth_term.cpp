@@ -74,6 +74,10 @@ class TermList {
       // A variable that never varied drives nothing.
       if (any_ || driver->varies()) add_of(driver);
     }
+    for (Driver& each : changes_of_others(log_)) {
+      const auto driver = std::make_shared<const Driver>(std::move(each));
+      if (any_ || driver->varies()) add_polynomials(driver, kBias, {1});
+    }
     add_of_wound_up_spindle();
     const auto attitude = std::make_shared<const Driver>(load(log_));
     if (any_ || attitude->varies()) add(play(attitude, kBias));
@@ -150,6 +154,7 @@ class TermList {
   }
   void add_of_clock(const DriverPointer& clock) {
     add(bell(clock, kBias));
+    add(window(clock, kBias));
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));
     for (const Target& target : {kBias, kScale}) {
@@ -163,6 +168,8 @@ class TermList {
       add_steps(clock, target);
       add(decay(clock, target));
     }
+    for (std::size_t other = 1; other < kAxisCount; ++other)
+      add(step(clock, {.form = TermForm::scale, .other = other}, StepEdge::sharp));
   }
   /// Of a component of the specific force.
   void add_of_component(const DriverPointer& driver) {

@@ -112,6 +112,12 @@ struct NoisePool::Point {
   Eigen::VectorXd right;
 };
 
+/// Where a search ended.
+struct NoisePool::Climb {
+  Point top;
+  bool converged = false;
+};
+
 NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
                      const Eigen::VectorXd& extra_variance)
     : processes_(&processes), model_(model) {
@@ -299,72 +305,6 @@ EstimatedPowers NoisePool::estimated(const PooledNoise& found, const Eigen::Matr
           gain_of_slow_noise(found, mean, design)};
 }
 
-namespace {
-
-/// Probability that there is slow noise at all: the odds by likelihood against a price for what
-/// powers that cannot be negative gain by chance.
-double probability_of_slow_noise(double gain) {
-  constexpr double kPrice = 8;  // of −2 ln L: in white noise the gain exceeds it one time in 60
-  return 1 / (1 + std::exp(0.5 * (kPrice - gain)));
-}
-
-}  // namespace
-
-PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const EstimatedPowers& powers,
-                                     const Eigen::MatrixXd& V, const Eigen::MatrixXd& X,
-                                     const Eigen::MatrixXd& C) {
-  const Eigen::Index p = C.rows();
-  PowersAllowance result{Eigen::MatrixXd::Zero(p, p), Eigen::VectorXd::Zero(p)};
-  const Eigen::Index count = powers.power.size();
-  if (count == 0) return result;
-  const Eigen::LLT<Eigen::MatrixXd> factor(V);
-  const Eigen::MatrixXd B = factor.solve(X);
-  std::vector<Eigen::MatrixXd> P, Z;  // −∂(X'V⁻¹X) by each power; L⁻¹ times what it does to B
-  Eigen::MatrixXd slope(p, count);  // of the diagonal of C
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::MatrixXd moved = processes.unit[static_cast<std::size_t>(i)] * B;
-    P.emplace_back(B.transpose() * moved);
-    slope.col(i) = (C * P.back() * C).diagonal();
-    Z.emplace_back(factor.matrixL().solve(moved));
-  }
-  const Eigen::MatrixXd& W = powers.covariance;
-  const double slow = probability_of_slow_noise(powers.gain_of_slow);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const auto a = static_cast<std::size_t>(i);
-    if (i >= kFirstSlow) result.M -= (1 - slow) * powers.power(i) * P[a];
-    for (Eigen::Index j = 0; j < count; ++j) {
-      const auto b = static_cast<std::size_t>(j);
-      result.M += 2 * slow * W(i, j) * (Z[a].transpose() * Z[b] - P[a] * C * P[b]);
-    }
-  }
-  result.variance = slow * slow * (slope * W).cwiseProduct(slope).rowwise().sum();
-  return result;
-}
-
-Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
-                               const std::vector<PowersAllowance>& allowances) {
-  constexpr double kFewest = 3;  // degrees of freedom; of fewer hardly anything is known
-  constexpr double kMost = 1;    // of C: an expansion to second order says nothing beyond
-  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(C.rows());
-  for (const PowersAllowance& allowance : allowances) {
-    M += allowance.M;
-    variance += allowance.variance;
-  }
-  const Eigen::LLT<Eigen::MatrixXd> root(C);
-  if (root.info() != Eigen::Success) return C;
-  const Eigen::MatrixXd L = root.matrixL();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> relative(L.transpose() * M * L);
-  const Eigen::MatrixXd axes = L * relative.eigenvectors();
-  const Eigen::MatrixXd allowance =
-      axes * relative.eigenvalues().cwiseMin(kMost).asDiagonal() * axes.transpose();
-  const Eigen::VectorXd wider =
-      (2 * C.diagonal().array().square() / variance.array().max(1e-300))
-          .max(kFewest)
-          .unaryExpr([](double dof) { return std::sqrt(dof / (dof - 2)); });
-  return wider.asDiagonal() * (C + allowance) * wider.asDiagonal();
-}
-
 Eigen::VectorXd NoisePool::starting_powers() const {
   Eigen::VectorXd power = Eigen::VectorXd::Zero(processes_->count());
   power.head<NoiseProcesses::kFirstMarkov>() =
@@ -403,36 +343,55 @@ double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::Vect
   return climb(first, free, mean, design).deviance - found.deviance;
 }
 
-PooledNoise NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
-                             const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const {
+template <typename Evaluate>
+NoisePool::Climb NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+                                  const Evaluate& evaluate) const {
   constexpr int kIterations = 60;
   constexpr double kEnough = 1e-2;  // of −2 ln L: far below anything a test can feel
-  PooledNoise result;
-  Point now = evaluate(first, mean, design);
-  for (int iteration = 0; iteration < kIterations && !result.converged; ++iteration) {
+  Climb climb{evaluate(first)};
+  Point& now = climb.top;
+  for (int iteration = 0; iteration < kIterations && !climb.converged; ++iteration) {
     const Eigen::VectorXd target = nonnegative_solution(now.normal, now.right, free);
     const Eigen::VectorXd step = target - now.power;
     const double promised =
         step.dot(now.right - now.normal * now.power) - 0.5 * step.dot(now.normal * step);
-    result.converged = promised < 0.1 * kEnough;
-    if (result.converged) break;
+    climb.converged = promised < 0.1 * kEnough;
+    if (climb.converged) break;
     Point next;
     bool better = false;
     for (int quartering = 0; quartering < 5 && !better; ++quartering) {
       const Eigen::VectorXd candidate = now.power + std::ldexp(1.0, -2 * quartering) * step;
       const bool singular = !(candidate(kTermQ) + candidate(kTermN) > 0) && !own_noise_;
       if (singular) continue;
-      next = evaluate(candidate, mean, design);
+      next = evaluate(candidate);
       better = next.deviance <= now.deviance;
     }
-    result.converged = !better || now.deviance - next.deviance < kEnough;
+    climb.converged = !better || now.deviance - next.deviance < kEnough;
     if (better) now = std::move(next);
   }
-  result.power = now.power;
-  result.deviance = now.deviance;
-  result.likelihood_deviance = now.likelihood_deviance;
-  result.covariance = covariance(now.power);
-  return result;
+  return climb;
+}
+
+PooledNoise NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+                             const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const {
+  const Climb found = climb(
+      first, free, [&](const Eigen::VectorXd& power) { return evaluate(power, mean, design); });
+  return {found.top.power, covariance(found.top.power), found.top.deviance,
+          found.top.likelihood_deviance, found.converged};
+}
+
+std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
+                                                      const Eigen::VectorXd& mean,
+                                                      const Eigen::MatrixXd& design) const {
+  if (densities_.size() == 0) return std::nullopt;
+  std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
+  free[kTermQ] = quantization_is_free();
+  const Climb of_record = climb(starting_powers(), free,
+                                [&](const Eigen::VectorXd& power) { return record_at(power); });
+  const PooledNoise of_run =
+      NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);
+  return Contradiction{both.deviance - of_record.top.deviance - of_run.deviance,
+                       of_record.top.power, of_run.power};
 }
 
 PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,

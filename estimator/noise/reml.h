@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "estimator/noise/covariance.h"
@@ -40,6 +41,12 @@ struct EstimatedPowers {
   double gain_of_slow = 0;     ///< of −2 ln L, by the slow ones among them
 };
 
+/// The noise of record and run, each by itself.
+struct Contradiction {
+  double deviance = 0;  ///< by how much −2 ln L of both is better when each has powers of its own
+  Eigen::VectorXd power_of_record, power_of_run;  ///< one per process
+};
+
 /// Restricted maximum likelihood (Patterson & Thompson, 1971) of the powers, all ≥ 0, given window
 /// means y = design·β + noise, β free, times the likelihood of the record that `model` came from.
 /// A record that determines white noise well pins it; the slow processes, which a record shorter
@@ -67,12 +74,17 @@ class NoisePool {
   /// powers are `power` and P is the projector of their Σ and of the design.
   Eigen::MatrixXd information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
                                  const std::vector<Eigen::Index>& wanted) const;
+  /// Whether the record and the run can be of one noise; nothing without a record. `both`: what
+  /// pool() found for this mean and design.
+  std::optional<Contradiction> contradiction(const PooledNoise& both, const Eigen::VectorXd& mean,
+                                             const Eigen::MatrixXd& design) const;
   /// Σ of the window means at given powers.
   Eigen::MatrixXd covariance(const Eigen::VectorXd& power) const;
   const NoiseProcesses& processes() const { return *processes_; }
 
  private:
   struct Point;
+  struct Climb;
   struct Seen;
   /// The record's restricted likelihood and its derivatives; zero without a record.
   Point record_at(const Eigen::VectorXd& power) const;
@@ -92,7 +104,12 @@ class NoisePool {
   /// than without any.
   double gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
                             const Eigen::MatrixXd& design) const;
-  /// pool() from powers to begin with and with which of them are free.
+  /// The highest likelihood from powers to begin with and with which of them are free; `evaluate`
+  /// makes a Point of powers.
+  template <typename Evaluate>
+  Climb climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+              const Evaluate& evaluate) const;
+  /// pool() from there.
   PooledNoise climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
                     const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
 
@@ -115,24 +132,6 @@ NoiseModel with_slow_noise_only(NoiseModel model, double slope);
 /// strongest Gauss-Markov process in its place, and flicker for the others.
 NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
                            const PooledNoise& pooled, double span_s);
-
-/// What one record adds to the knowledge that the powers of its noise are estimates. p parameters.
-struct PowersAllowance {
-  Eigen::MatrixXd M;         ///< p×p: the covariance C becomes C + C·M·C
-  Eigen::VectorXd variance;  ///< p, of the diagonal of C
-};
-/// Of generalised least-squares estimates of the design X (n×p) with covariance C under noise of
-/// covariance V. M holds the scatter of the weights (Kenward & Roger, Biometrics 53, 1997, eq. 5)
-/// and takes off slow noise as far as it may not be there at all: powers cannot be negative, so
-/// estimates of none are too large as often as not.
-PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const EstimatedPowers& powers,
-                                     const Eigen::MatrixXd& V, const Eigen::MatrixXd& X,
-                                     const Eigen::MatrixXd& C);
-/// C with the allowances of all records, whose noise is independent, at most doubled by them, and
-/// every standard uncertainty with that of Student's t for its degrees of freedom ν = 2·C²/var C,
-/// by √(ν/(ν − 2)) (Satterthwaite; JCGM 101:2008, 6.4.9.4).
-Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
-                               const std::vector<PowersAllowance>& allowances);
 
 /// P = Σ⁻¹ − Σ⁻¹X(X'Σ⁻¹X)⁻¹X'Σ⁻¹, which whitens and removes the design at once: r'Σ⁻¹r = y'Py for
 /// the generalised least-squares residual r.

@@ -60,7 +60,8 @@ void add_finding(const ScalarSearchResult& search, std::size_t index, Diagnosis&
   const std::vector<EffectParameter> parameters = reported(search.fit, index);
   words += (words.empty() ? "" : "; ");
   if (const auto* smooth = dynamic_cast<const SmoothTerm*>(active.effect)) {
-    diagnosis.unlisted.push_back({smooth->driver(),
+    diagnosis.unlisted.push_back({{},
+                                  smooth->driver(),
                                   to_string(smooth->form()),
                                   {active.axis},
                                   smooth->shape(),
@@ -73,9 +74,14 @@ void add_finding(const ScalarSearchResult& search, std::size_t index, Diagnosis&
     return;
   }
   words += words_of(active.effect->id(), active.axis, parameters);
-  FoundEffect found{active.effect->id(),  {active.axis},        parameters, finding.p_value,
-                    finding.heldout_gain, finding.alternatives, {}};
-  found.sigmas = finding.sigmas;
+  FoundEffect found{{finding.alternatives, {}, {}},
+                    active.effect->id(),
+                    {active.axis},
+                    parameters,
+                    finding.p_value,
+                    finding.heldout_gain,
+                    {},
+                    finding.sigmas};
   if (!found.alternatives.empty()) {
     found.separate_by =
         "readings at known angles (calibrate with the dividing head): without angles only the sum "

@@ -49,13 +49,16 @@ Calibration some_calibration() {
   effect.heldout_gain = 0.9;
   effect.alternatives = {"sensor.asymmetry"};
   calibration.diagnosis.effects = {effect};
-  calibration.diagnosis.unlisted = {{.driver = "rh_pct",
-                                     .form = "bias",
-                                     .axes = {0, 2},
-                                     .shape = "rises",
-                                     .parameters = {{"p1", 0, 0.001, 0.0001, "g"}},
-                                     .p_value = 0.001,
-                                     .heldout_gain = 0.5}};
+  UnlistedStructure structure;
+  structure.driver = "rh_pct";
+  structure.form = "bias";
+  structure.axes = {0, 2};
+  structure.shape = "rises";
+  structure.parameters = {{"p1", 0, 0.001, 0.0001, "g"}};
+  structure.p_value = 0.001;
+  structure.heldout_gain = 0.5;
+  structure.alternatives = {"sensor.drift"};
+  calibration.diagnosis.unlisted = {structure};
   Visit visit;
   visit.t_mean_s = 2.5;
   visit.delta_rad = 0.5;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "estimator/calibrate.h"
 #include "tests/estimator/synthetic_run.h"
@@ -82,6 +83,29 @@ TEST(NoiseDrivers, NoiseThatFollowsNothingHasNoDriver) {
     const Calibration result = calibration_of(synthetic_run(seed, kFineConverter));
     EXPECT_THAT(result.diagnosis.unlisted, IsEmpty()) << seed << result.diagnosis.reason;
   }
+}
+
+// It passed for slow noise that the record, at rest and shorter, happened not to show: "clean".
+TEST(NoiseDrivers, ABiasThatWandersAsTheRecordNeverDidIsSaid) {
+  SyntheticOptions options = fine_grid();
+  options.more_x_V = [random = std::mt19937_64(8), level_V = 0.0, next_s = 61.0](
+                         const auto&, double t_s) mutable {
+    constexpr double kSize_V = 3e-4;
+    if (t_s < next_s) return level_V;
+    next_s += std::uniform_real_distribution<double>(5, 25)(random);
+    level_V = std::normal_distribution<double>(0, kSize_V)(random);
+    return level_V;
+  };
+  const Calibration result = calibration_of(synthetic_run(6, kFineConverter, options));
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_EQ(result.diagnosis.verdict, Verdict::partly_explained);
+  ASSERT_FALSE(result.diagnosis.unlisted.empty());
+  const UnlistedStructure& found = result.diagnosis.unlisted.back();
+  EXPECT_EQ(found.driver, "t_s");
+  EXPECT_EQ(found.form, "bias");
+  EXPECT_EQ(found.shape, "noise, wandering beyond the static record");
+  EXPECT_EQ(found.axes, std::vector<std::size_t>{0});
+  EXPECT_GT(found.heldout_gain, 0.5);
 }
 
 // Beyond its limit an axis is quiet.

@@ -13,6 +13,7 @@
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/identify.h"
+#include "estimator/noise/powers_allowance.h"
 #include "estimator/noise/spectrum.h"
 
 namespace plumbline {

@@ -10,6 +10,7 @@
 namespace plumbline {
 namespace {
 
+using testing::Contains;
 using testing::IsEmpty;
 
 struct Structure {
@@ -18,18 +19,21 @@ struct Structure {
   const char* shape;
 };
 
-void expect_only_structure(const SyntheticOptions& options, const Structure& expected) {
+UnlistedStructure expect_only_structure(const SyntheticOptions& options,
+                                        const Structure& expected) {
   const SyntheticRun data = synthetic_run(7, {16, -5.0, 0.0}, options);
   const Calibration result = calibrate({data.run, &data.still, data.description}, {});
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
+  EXPECT_EQ(result.diagnosis.unlisted.size(), 1U);
+  if (result.diagnosis.unlisted.empty()) return {};
   const UnlistedStructure& found = result.diagnosis.unlisted.front();
   EXPECT_EQ(found.driver, expected.driver);
   EXPECT_EQ(found.form, expected.form);
   EXPECT_EQ(found.shape, expected.shape);
   for (std::size_t i = 0; i < kAxisCount; ++i)
     EXPECT_LT(result.after.heldout_pose_rms_mps2[i], 1.3 * result.floor_pose_rms_mps2[i]);
+  return found;
 }
 
 TEST(Structure, AnAxisThatWasStruckHasAnotherScaleFromThenOn) {
@@ -219,6 +223,61 @@ TEST(Structure, WhatDependsOnTheWaySaysNothingOfTheFirstPose) {
   };
   expect_only_structure(
       options, {"previous_pose", "bias", "polynomial of degree 1 in the change of h since"});
+}
+
+// A force that one ring feels: the time would have to jump just between two rings. Which of both it
+// was, these poses do not tell, and it is said.
+TEST(Structure, ABiasThatJumpsBetweenTwoRingsFollowsTheComponent) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) { return a_g[2] > 0.7 ? 8e-4 : 0.0; };
+  const UnlistedStructure found = expect_only_structure(options, {"a_z", "bias", "step"});
+  EXPECT_THAT(found.alternatives, Contains("sensor.bias_step"));
+  EXPECT_NE(found.separate_by, "");
+}
+
+// As a step of the bias in time and another structure beside it.
+TEST(Structure, ABellOverTwoRingsIsOne) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double) {
+    return 1e-3 * std::exp(-0.5 * std::pow((a_g[2] - 0.42) / 0.1, 2));
+  };
+  expect_only_structure(options, {"a_z", "bias", "bell"});
+}
+
+// As two steps that cancel.
+TEST(Structure, ABiasThatIsThereForAWhileIsAWindow) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto&, double t_s) { return t_s > 200 && t_s < 290 ? 6e-4 : 0.0; };
+  expect_only_structure(options, {"t_s", "bias", "window"});
+}
+
+TEST(Structure, ACrossSensitivityThatJumpsIsAScale) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [](const auto& a_g, double t_s) { return t_s > 280 ? 2e-3 * a_g[1] : 0.0; };
+  expect_only_structure(options, {"t_s", "scale", "step, times the component of the next axis"});
+}
+
+TEST(Structure, WhatAnotherAxisFeltBeforeIsOneStraightLine) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 20;
+  options.more_x_V = [before_g = 0.0, at_g = 0.0, last_s = 0.0](const auto& a_g,
+                                                                double t_s) mutable {
+    constexpr double kBetweenPoses_s = 1;
+    if (t_s > last_s + kBetweenPoses_s) before_g = at_g;
+    at_g = a_g[1];
+    last_s = t_s;
+    return 1e-3 * before_g;
+  };
+  expect_only_structure(
+      options, {"previous_pose", "bias",
+                "polynomial of degree 1 in the change of the component of the next axis since"});
 }
 
 }  // namespace

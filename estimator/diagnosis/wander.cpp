@@ -1,0 +1,99 @@
+#include "estimator/diagnosis/wander.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "estimator/diagnosis/heldout.h"
+#include "estimator/diagnosis/screening.h"
+#include "estimator/linear_algebra.h"
+
+namespace plumbline {
+namespace {
+
+/// What the noise has to explain: n means less the model, its columns, the variance of their own.
+struct Left {
+  Eigen::VectorXd residual_V, own_V2;
+  Eigen::MatrixXd design;
+  Eigen::Index count() const { return residual_V.size(); }
+};
+
+Left half_of(const Left& whole, Eigen::Index first, Eigen::Index count) {
+  return {whole.residual_V.segment(first, count), whole.own_V2.segment(first, count),
+          orthonormal_basis(whole.design.middleRows(first, count))};
+}
+
+NoiseProcesses half_of(const NoiseProcesses& whole, Eigen::Index first, Eigen::Index count) {
+  NoiseProcesses half{whole.decay_per_s, {}, whole.is_diagonal};
+  for (const Eigen::MatrixXd& unit : whole.unit)
+    half.unit.emplace_back(unit.block(first, first, count, count));
+  return half;
+}
+
+/// Sum of squares that noise of these powers expects to be count() less the columns.
+double whitened_square(const NoisePool& pool, const Eigen::VectorXd& power, const Left& left) {
+  const Eigen::MatrixXd P = make_projector(pool.covariance(power), left.design).P;
+  return left.residual_V.dot(P * left.residual_V);
+}
+
+/// Share of the excess in each half of the run that the noise of the other half explains.
+double gain_of_other_half(const NoiseProcesses& processes, const NoiseModel& record,
+                          const Contradiction& found, const Left& left) {
+  const Eigen::Index middle = left.count() / 2;
+  double without = 0, with = 0, expected = 0;
+  for (const bool first : {true, false}) {
+    const Eigen::Index here = first ? 0 : middle, there = first ? middle : 0;
+    const Eigen::Index count = first ? middle : left.count() - middle;
+    const NoiseProcesses of_half = half_of(processes, here, count);
+    const NoiseProcesses of_other = half_of(processes, there, left.count() - count);
+    const Left half = half_of(left, here, count),
+               other = half_of(left, there, left.count() - count);
+    const Eigen::VectorXd power = NoisePool(of_other, without_record(record), other.own_V2)
+                                      .pool(other.residual_V, other.design, &found.power_of_run)
+                                      .power;
+    const NoisePool pool(of_half, record, half.own_V2);
+    without += whitened_square(pool, found.power_of_record, half);
+    with += whitened_square(pool, power, half);
+    expected += static_cast<double>(count - half.design.cols());
+  }
+  return share_removed(without, with, expected);
+}
+
+}  // namespace
+
+std::optional<NoiseDriver> wander_beyond_record(const SearchInput& input, const SearchResult& found,
+                                                std::size_t axis) {
+  constexpr double kFalseAlarm = 1e-6;
+  constexpr double kMatters = 1.5;  // ratio of standard deviations
+  const CodeFaults& codes = input.log.codes[axis];
+  if (found.coarse[axis] || codes.coarser_lattice || !codes.stuck_bits.empty()) return {};
+  const auto n = std::ssize(input.log.visits);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, found.fit.parameters);
+  const Left left{
+      found.observed.mean_V[axis] - predict_means_V(input.log, found.fit.parameters)[axis],
+      found.own_V2[axis],
+      orthonormal_basis(jacobian.middleRows(static_cast<Eigen::Index>(axis) * n, n))};
+  const NoiseModel& record = input.noise[axis];
+  const NoisePool pool(input.processes, record, left.own_V2);
+  const auto each =
+      pool.contradiction(pool.pool(left.residual_V, left.design, &found.noise[axis].power),
+                         left.residual_V, left.design);
+  if (!each) return {};
+  const auto left_by = [&](const Eigen::VectorXd& power) {
+    const Eigen::MatrixXd V = pool.covariance(power);
+    return V.trace() - left.design.cwiseProduct(V * left.design).sum();
+  };
+  const double log_p = log_chi_squared_tail(std::max(0.0, each->deviance),
+                                            static_cast<double>(input.processes.count()));
+  NoiseDriver wander{axis, "t_s", "noise, wandering beyond the static record"};
+  wander.at_random = true;
+  wander.p_value = p_of_search(log_p, kAxisCount);
+  wander.sigmas = sigmas_of(log_p);
+  wander.ratio = std::sqrt(left_by(each->power_of_run) / left_by(each->power_of_record));
+  if (!(wander.p_value < kFalseAlarm) || !(wander.ratio > kMatters)) return {};
+  wander.u_ratio = wander.ratio * std::log(wander.ratio) / std::sqrt(each->deviance);
+  wander.heldout_gain = gain_of_other_half(input.processes, record, *each, left);
+  if (!(wander.heldout_gain > 0)) return {};
+  return wander;
+}
+
+}  // namespace plumbline
