@@ -248,6 +248,30 @@ Searched search_readings(const ExplainInput& input, const SearchInput& search,
   return {nullptr, std::move(candidates), std::move(found), std::nullopt};
 }
 
+/// Effects with which the poses that were left out of the fit come out clearly worse than by the 12
+/// parameters are none, however much more like noise they make the rest: those of the axis go.
+void drop_what_worsens(const SearchInput& search, const Heldout& heldout,
+                       const std::vector<Blocks>& partitions, const PerAxis<double>& before_mps2,
+                       Searched& searched) {
+  constexpr double kClearly = 1.1;
+  SearchResult& found = searched.found;
+  const std::size_t size = found.evidence.size();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (!(rms(heldout_mps2(heldout, partitions, found.fit)[axis]) > kClearly * before_mps2[axis]))
+      continue;
+    for (std::size_t k = found.evidence.size(); k-- > 0;) {
+      const ActiveEffect& active = found.fit.parameters.effects[k];
+      if (active.effect->subject() == Subject::sensor && active.axis == axis &&
+          !active.effect->certain(search.log, axis))
+        found.remove(k);
+    }
+    found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
+  }
+  if (found.evidence.size() < size)
+    found.responses =
+        candidate_responses(search.log, searched.candidates, found.whitening, found.fit.parameters);
+}
+
 /// Leaves of `searched` what carries over to poses that were left out; returns the gains there.
 /// `heldout` is that of what was found, `estimated` the input that the codes are from.
 std::vector<double> keep_what_carries(const SearchInput& search, const SearchInput& estimated,
@@ -310,6 +334,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
   const Heldout heldout(log, mean_V, found.whitening);
   const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
+  if (!searched.codes)
+    drop_what_worsens(search, heldout, partitions, result.before.heldout_pose_rms_mps2, searched);
   const std::vector<double> gains =
       keep_what_carries(search, estimated_search, heldout, partitions, searched);
   if (found.evidence.empty()) return without_effects();

@@ -10,8 +10,6 @@ namespace plumbline {
 
 namespace {
 
-constexpr Eigen::Index kFirstSlow = kTermB;  // among the processes
-
 /// Probability that there is slow noise at all: the odds by likelihood against a price for what
 /// powers that cannot be negative gain by chance.
 double probability_of_slow_noise(double gain) {
@@ -40,6 +38,7 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
   }
   const Eigen::MatrixXd& W = powers.covariance;
   const double slow = probability_of_slow_noise(powers.gain_of_slow);
+  constexpr Eigen::Index kFirstSlow = kTermB;
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto a = static_cast<std::size_t>(i);
     if (i >= kFirstSlow) result.M -= (1 - slow) * powers.power(i) * P[a];

@@ -1,0 +1,262 @@
+// Functions of a driver that jump again and again, or there and back.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "estimator/effects/driven_term.h"
+
+namespace plumbline {
+namespace {
+
+class Pulses final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    constexpr double kFine = 0.1;  // of an edge, so that some readings are in it
+    const double fine = kFine * edge();
+    return {{"edge", "s", ParameterRole::index},
+            {"period", "s", ParameterRole::shape, fine},
+            {"width", "s", ParameterRole::shape, fine},
+            {"middle", "s", ParameterRole::shape, fine, true},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    constexpr int kMiddles = 4, kMostPulses = 8;
+    std::vector<Hypothesis> starts;
+    for (int pulses = 2; pulses <= kMostPulses; ++pulses) {
+      const double period = (high - low) / pulses;
+      for (int k = 0; k < kMiddles; ++k)
+        starts.push_back(
+            {{edge(), period, 0.5 * period, low + period * k / kMiddles, target().typical_size()}});
+    }
+    return starts;
+  }
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& instances) const override {
+    if (target().form != TermForm::bias) return {};
+    if (repeated.id() == "sensor.bias_step") return from_steps(instances);
+    if (repeated.id() != id()) return {};
+    if (is_saw_tooth(repeated)) return from_saw_tooth(instances.front());
+    return is_wave(repeated) ? from_waves(instances) : std::vector<Hypothesis>{};
+  }
+
+ private:
+  std::string function() const override { return "train of pulses"; }
+  double at(double value, const double* p) const override {
+    const double from_middle = std::abs(std::remainder(value - p[3], p[1]));
+    return p[4] / (1 + std::exp((from_middle - 0.5 * p[2]) / p[0]));
+  }
+  double edge() const { return part_of_spacing(); }
+  /// Two steps, a period apart, and one back.
+  std::vector<Hypothesis> from_steps(const std::vector<std::vector<double>>& steps) const {
+    if (steps.size() != 3) return {};
+    const double size = steps[0][0], first_s = steps[0][1];
+    const double width_s = steps[2][1] - first_s;
+    return {{{edge(), steps[1][1] - first_s, width_s, first_s + 0.5 * width_s, size}}};
+  }
+  /// The longest of several waves is the fundamental.
+  std::vector<Hypothesis> from_waves(const std::vector<std::vector<double>>& waves) const {
+    if (waves.size() < 2) return {};  // one alone is a wave
+    std::vector<double> longest;
+    for (const auto& wave : waves)
+      if (longest.empty() || wave[1] > longest[1]) longest = wave;
+    const double period = longest[1];
+    const double crest =
+        longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
+    std::vector<Hypothesis> found;
+    for (const double share : kWidths)
+      found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
+    return found;
+  }
+  static constexpr std::array kWidths = {0.2, 0.35, 0.5, 0.65, 0.8};  // of a period
+  /// Where the one falls the other may begin or end.
+  std::vector<Hypothesis> from_saw_tooth(const std::vector<double>& saw) const {
+    std::vector<Hypothesis> found;
+    const double period = saw[1], fall = saw[2];
+    for (const double share : kWidths)
+      for (const double side : {-0.5, 0.5})
+        found.push_back({{edge(), period, share * period, fall + side * share * period,
+                          target().typical_size()}});
+    return found;
+  }
+};
+
+class Window final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    // Between two visits nothing moves a sharp edge.
+    return {{"from", "s", ParameterRole::index},
+            {"to", "s", ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  /// Few: two steps that cancel, or a train, lead to all others.
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    const double width = 0.15 * (high - low);
+    std::vector<Hypothesis> starts;
+    for (double from = low; from + width < high; from += 0.5 * width)
+      starts.push_back(half_way(from, from + width, target().typical_size()));
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 4;
+    const double spacing = 4 * part_of_spacing();
+    std::vector<Hypothesis> others;
+    for (int from = -kPlaces; from <= kPlaces; ++from)
+      for (int to = -kPlaces; to <= kPlaces; ++to)
+        others.push_back(
+            half_way(found.p[0] + spacing * from, found.p[1] + spacing * to, found.p[2]));
+    return others;
+  }
+  /// A step and one back, or a train of which the run saw one pulse.
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& steps) const override {
+    if (dynamic_cast<const Pulses*>(&repeated) != nullptr && repeated.id() == id()) {
+      const std::vector<double>& train = steps.front();
+      return {half_way(train[3] - 0.5 * train[2], train[3] + 0.5 * train[2], train[4])};
+    }
+    if (repeated.id() != "sensor.bias_step" || steps.size() != 2) return {};
+    const bool in_order = steps[0][1] < steps[1][1];
+    const std::vector<double>&first = steps[in_order ? 0 : 1], &second = steps[in_order ? 1 : 0];
+    if (!(first[0] * second[0] < 0)) return {};
+    return {half_way(first[1], second[1], first[0])};
+  }
+
+ private:
+  std::string function() const override { return "window"; }
+  double at(double value, const double* p) const override {
+    return value > p[0] && value < p[1] ? p[2] : 0;
+  }
+  /// Edges half way between the visits that these times lie between.
+  Hypothesis half_way(double from, double to, double size) const {
+    const auto moved = [this](double time) {
+      const std::vector<double>& times = variable().value[0];
+      const auto after = std::upper_bound(times.begin(), times.end(), time);
+      if (after == times.begin() || after == times.end()) return time;
+      return 0.5 * (*(after - 1) + *after);
+    };
+    return {{moved(from), moved(to), size}};
+  }
+};
+
+class SawTooth final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    const double fine = kFine * edge();
+    return {{"edge", "", ParameterRole::index},
+            {"period", "", ParameterRole::shape, fine},
+            {"at", "", ParameterRole::shape, fine, true},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    constexpr int kMostTeeth = 12;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    if (is_of_another_axis(axis) || !resolves(4 * kMostTeeth)) return starts;
+    for (int halves = 4; halves <= 2 * kMostTeeth; ++halves) add(2 * (high - low) / halves, starts);
+    return starts;
+  }
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& instances) const override {
+    std::vector<Hypothesis> found;
+    if (repeated.id() == id() && is_wave(repeated)) {
+      double longest = 0;
+      for (const auto& wave : instances) longest = std::max(longest, wave[1]);
+      for (const double share : {0.97, 1.0, 1.03}) add(share * longest, found);
+    }
+    const auto* switching = dynamic_cast<const Pulses*>(&repeated);
+    if (switching != nullptr && repeated.id() == id())
+      for (const double share : {0.97, 1.0, 1.03}) add(share * instances.front()[1], found);
+    const bool of_codes = repeated.id() == "adc.code_step" && variable().output_of;
+    const bool of_time = repeated.id() == "sensor.bias_step" && variable().is_clock();
+    if (of_codes || (of_time && target().form == TermForm::bias)) from_falls(instances, found);
+    return found;
+  }
+  /// Falls that were found one by one.
+  void from_falls(const std::vector<std::vector<double>>& falls,
+                  std::vector<Hypothesis>& found) const {
+    std::vector<double> places;
+    for (const auto& fall : falls) places.push_back(fall[1]);
+    std::sort(places.begin(), places.end());
+    for (std::size_t k = 1; k < places.size(); ++k)
+      found.push_back({{edge(), places[k] - places[k - 1], places[k], target().typical_size()}});
+    if (places.size() < 3) return;
+    // The straight line through all of them; some teeth may be missing.
+    double shortest = places.back() - places.front();
+    for (std::size_t k = 1; k < places.size(); ++k)
+      shortest = std::min(shortest, places[k] - places[k - 1]);
+    const auto count = static_cast<Eigen::Index>(places.size());
+    const Eigen::Map<const Eigen::ArrayXd> at(places.data(), count);
+    const Eigen::ArrayXd tooth = ((at - at(0)) / shortest).round();
+    const Eigen::ArrayXd off = tooth - tooth.mean();
+    const double period = (off * (at - at.mean())).sum() / off.square().sum();
+    // A step in time is told from the visit that follows it.
+    const double before = variable().is_clock() ? 2 * part_of_spacing() : 0;
+    found.push_back(
+        {{edge(), period, at.mean() - period * tooth.mean() - before, target().typical_size()}});
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 4;
+    constexpr double kReach = 0.1;  // of a tooth
+    const double span = range().second - range().first, teeth = span / found.p[1];
+    std::vector<Hypothesis> others;
+    for (int period = -kPlaces; period <= kPlaces; ++period)
+      for (int at = -kPlaces; at <= kPlaces; ++at)
+        others.push_back({{found.p[0], found.p[1] * (1 + kReach * period / (teeth * kPlaces)),
+                           found.p[2] + kReach * found.p[1] * at / kPlaces, found.p[3]}});
+    // A fall between two visits, of which neither sees the edge.
+    constexpr double kSharp = 0.3;
+    for (int at = -kPlaces; variable().is_clock() && at <= kPlaces; ++at)
+      others.push_back({{kSharp * found.p[0], found.p[1], found.p[2] + 0.5 * part_of_spacing() * at,
+                         found.p[3]}});
+    return others;
+  }
+
+ private:
+  std::string function() const override { return "saw tooth"; }
+  double at(double value, const double* p) const override {
+    const double cycles = (value - p[2]) / p[1], edge = std::round(cycles);
+    const double fallen = 1 - effect::share_below(edge * p[1] + p[2], value, p[0]);
+    return p[3] * (cycles - (edge - 1 + fallen) - 0.5);
+  }
+  static constexpr double kFine = 0.1;
+  /// Noise of single readings reaches over a fall; between two visits it could not be moved.
+  double edge() const { return variable().scatter > 0 ? variable().scatter : part_of_spacing(); }
+  void add(double period, std::vector<Hypothesis>& starts) const {
+    constexpr int kPlaces = 6;
+    for (int k = 0; k < kPlaces; ++k)
+      starts.push_back(
+          {{edge(), period, range().first + period * k / kPlaces, target().typical_size()}});
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target) {
+  return std::make_unique<Window>(std::move(clock), target);
+}
+
+std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {
+  return std::make_unique<Pulses>(std::move(driver), target);
+}
+
+std::unique_ptr<SmoothTerm> saw_tooth(DriverPointer driver, const Target& target) {
+  return std::make_unique<SawTooth>(std::move(driver), target);
+}
+
+bool is_saw_tooth(const Effect& effect) {
+  return dynamic_cast<const SawTooth*>(&effect) != nullptr;
+}
+
+}  // namespace plumbline
