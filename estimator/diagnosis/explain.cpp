@@ -248,16 +248,16 @@ Searched search_readings(const ExplainInput& input, const SearchInput& search,
   return {nullptr, std::move(candidates), std::move(found), std::nullopt};
 }
 
-/// Effects with which the poses that were left out of the fit come out clearly worse than by the 12
+/// Effects with which the poses that were left out of the fit come out far worse than by the 12
 /// parameters are none, however much more like noise they make the rest: those of the axis go.
 void drop_what_worsens(const SearchInput& search, const Heldout& heldout,
                        const std::vector<Blocks>& partitions, const PerAxis<double>& before_mps2,
                        Searched& searched) {
-  constexpr double kClearly = 1.1;
+  constexpr double kFar = 2;  // slow noise alone may make it worse by a little
   SearchResult& found = searched.found;
   const std::size_t size = found.evidence.size();
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (!(rms(heldout_mps2(heldout, partitions, found.fit)[axis]) > kClearly * before_mps2[axis]))
+    if (!(rms(heldout_mps2(heldout, partitions, found.fit)[axis]) > kFar * before_mps2[axis]))
       continue;
     for (std::size_t k = found.evidence.size(); k-- > 0;) {
       const ActiveEffect& active = found.fit.parameters.effects[k];
