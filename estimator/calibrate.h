@@ -121,6 +121,8 @@ struct UnlistedStructure : Ambiguity {
   double sigmas = 0;  ///< as FoundEffect::sigmas
   /// Whether it is the noise within the dwells that follows the driver: no mean knows of it.
   bool is_of_noise() const { return shape.starts_with("noise, "); }
+  /// Whether it is slow noise that the static record knows nothing of.
+  bool is_wandering() const { return is_of_noise() && form == "bias"; }
 };
 
 enum class Verdict { clean, explained, partly_explained, unexplained, undetermined };

@@ -147,6 +147,8 @@ std::string parameter_text(const EffectParameter& parameter) {
 }
 
 std::string unlisted_name(const UnlistedStructure& found, const Translator& tr) {
+  if (found.is_wandering())
+    return tr("not among the listed effects: the bias wanders beyond the static record");
   if (found.is_of_noise())
     return tr("not among the listed effects: the noise follows {}", found.driver);
   const std::string form = found.form == "bias"       ? tr("the bias")

@@ -114,6 +114,7 @@ std::string describe(const FoundEffect& effect) {
 }
 
 std::string describe(const UnlistedStructure& structure) {
+  if (structure.is_wandering()) return "unlisted: the bias wanders beyond the static record";
   if (structure.is_of_noise())
     return "unlisted: the noise follows " + structure.driver + " (" + structure.shape + ")";
   std::string text =
