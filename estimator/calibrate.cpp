@@ -170,8 +170,7 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisWork& work) {
 bool rounded_as_declared(const CalibrationInput& input, std::size_t axis) {
   const auto& adc = input.description.adc;
   if (!adc) return true;
-  const CodeFaults faults = code_faults(input.run, axis, *adc);
-  return faults.stuck_bits.empty() && !faults.coarser_lattice;
+  return !code_faults(input.run, axis, *adc).any();
 }
 
 AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, std::size_t axis) {

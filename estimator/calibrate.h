@@ -151,6 +151,8 @@ struct Diagnosis {
     const Ambiguity& ambiguity;
   };
   std::vector<Finding> findings() const;
+  /// Whether any of them joined the model of the means.
+  bool enlarges_model() const;
 };
 
 /// Input-referred errors in m/s² (volts / K_ii · g_n).

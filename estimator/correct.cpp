@@ -7,7 +7,7 @@
 #include <memory>
 #include <numbers>
 
-#include "estimator/diagnosis/explain.h"
+#include "estimator/diagnosis/restored_model.h"
 
 namespace plumbline {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "estimator/calibrate.h"
-#include "estimator/diagnosis/explain.h"
+#include "estimator/diagnosis/restored_model.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/pose_means.h"

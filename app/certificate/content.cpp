@@ -73,13 +73,6 @@ std::string headline(const Composer& c) {
   return c.input.scalar != nullptr ? c.tr("Calibrated without angles") : c.tr("Calibrated");
 }
 
-/// Whether effects or structures joined the model of the means.
-bool something_was_added(const Diagnosis& diagnosis) {
-  return !diagnosis.effects.empty() ||
-         std::any_of(diagnosis.unlisted.begin(), diagnosis.unlisted.end(),
-                     [](const UnlistedStructure& found) { return !found.is_of_noise(); });
-}
-
 /// What was found, in a sentence that needs no symbols.
 std::string finding(const Composer& c) {
   const Diagnosis& diagnosis = c.input.calibration.diagnosis;
@@ -101,7 +94,7 @@ std::string finding(const Composer& c) {
                        "The twelve parameters describe the unit; nothing stands out of the noise.");
     case Verdict::explained:
     case Verdict::partly_explained: {
-      if (!something_was_added(diagnosis))
+      if (!diagnosis.enlarges_model())
         return c.tr("The twelve parameters describe the unit. Beside them: {}.", names);
       const std::string added =
           nine
@@ -127,7 +120,7 @@ std::string error_sentence(const Composer& c) {
   const auto worst = [](const PerAxis<double>& v) { return *std::max_element(v.begin(), v.end()); };
   const double floor = worst(calibration.floor_pose_rms_mps2);
   const double after = worst(calibration.after.heldout_pose_rms_mps2);
-  if (!something_was_added(calibration.diagnosis)) {
+  if (!calibration.diagnosis.enlarges_model()) {
     return c.tr(
         "Error of a pose that took no part in the fit: {} mm/s² RMS on the worst axis, where the "
         "noise alone would leave {} mm/s².",

@@ -13,10 +13,6 @@
 namespace plumbline::app::content {
 namespace {
 
-bool enlarged(const Calibration& calibration) {
-  return !calibration.diagnosis.effects.empty() || !calibration.diagnosis.unlisted.empty();
-}
-
 double scale_mps2(const Calibration& calibration, std::size_t axis) {
   return kStandardGravity_mps2 /
          std::abs(calibration.final.batch_ls[axis].value(static_cast<Eigen::Index>(axis)));
@@ -154,7 +150,7 @@ void add_errors(const Composer& c) {
   c.add(Heading{c.tr("Error before and after the added effects")});
   Table table;
   table.caption = c.tr("Input-referred errors, mm/s²");
-  const bool both = enlarged(calibration);
+  const bool both = calibration.diagnosis.enlarges_model();
   table.header = {c.tr("quantity")};
   for (const char* axis : kAxisName) {
     if (both) {
@@ -217,7 +213,7 @@ void add_findings(const Composer& c) {
     text += " " + c.tr("± gives standard uncertainties here.");
   }
   c.add(Paragraph{text, diagnosis.verdict == Verdict::unexplained ? Tone::warning : Tone::plain});
-  if (enlarged(c.input.calibration)) {
+  if (!c.input.calibration.diagnosis.findings().empty()) {
     add_effect_table(c);
     add_terms(c);
     add_alternatives(c);

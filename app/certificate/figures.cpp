@@ -45,10 +45,6 @@ double nice_ceiling(double value) {
   return 10 * power;
 }
 
-bool enlarged(const Calibration& calibration) {
-  return !calibration.diagnosis.effects.empty() || !calibration.diagnosis.unlisted.empty();
-}
-
 double largest_residual(const Calibration& calibration, bool before_too) {
   double largest = 0;
   for (const PoseResult& pose : calibration.pose_results) {
@@ -90,7 +86,7 @@ void draw_color_bar(Canvas& canvas, Point top_left, double width, double scale,
 }  // namespace
 
 Figure residual_map(const FigureContext& context, const Grid& grid) {
-  const bool both = enlarged(*context.calibration);
+  const bool both = context.calibration->diagnosis.enlarges_model();
   Figure figure;
   figure.caption = context.tr(
       "Residual of every pose over δ and h, one colour scale for all maps. Cells beyond twice the "

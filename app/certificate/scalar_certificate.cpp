@@ -36,10 +36,6 @@ namespace {
 
 constexpr double kMilli = 1e3;
 
-bool enlarged(const ScalarCalibration& calibration) {
-  return !calibration.diagnosis.effects.empty() || !calibration.diagnosis.unlisted.empty();
-}
-
 void add_nine(const Composer& c, const ScalarEstimate& estimate, const std::string& caption) {
   const std::string& unit = c.input.scalar->source.reading_unit;
   Table table;
@@ -168,7 +164,7 @@ void add_scalar_results(const Composer& c) {
       "whole triad nor its sign: z is the sensitive axis z, x is perpendicular to the sensitive "
       "axes y and z, the scales are positive. Expanded uncertainties with coverage factor k = 2 "
       "(about 95 %).")});
-  if (enlarged(calibration)) {
+  if (calibration.diagnosis.enlarges_model()) {
     add_nine(c, calibration.final, c.tr("Nine parameters, estimated together with the effects"));
     add_nine(c, calibration.estimate, c.tr("Nine parameters alone, for comparison"));
   } else {

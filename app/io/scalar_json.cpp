@@ -99,7 +99,7 @@ Json scalar_json(const ScalarCalibration& calibration, const ScalarSource& sourc
   scalar["expected_rms_mps2"] = json_number(calibration.expected_rms_mps2);
   scalar["expected_rms_correlated_mps2"] = json_number(calibration.expected_rms_blocks_mps2);
   scalar["scatter_mps2"] = json_number(calibration.scatter_mps2);
-  if (!calibration.diagnosis.effects.empty() || !calibration.diagnosis.unlisted.empty()) {
+  if (calibration.diagnosis.enlarges_model()) {
     scalar["with_effects"] = estimate_json(calibration.final);
     scalar["with_effects"]["residual_rms_mps2"] = json_number(calibration.final_residual_rms_mps2);
   }

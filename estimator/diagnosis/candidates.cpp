@@ -43,8 +43,7 @@ namespace {
 /// What an axis does from code to code has a name where the codes prove it.
 bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    if (term.driver() == std::string("code_") + kAxisName[i])
-      return log.codes[i].coarser_lattice || !log.codes[i].stuck_bits.empty();
+    if (term.driver() == std::string("code_") + kAxisName[i]) return log.codes[i].any();
   return false;
 }
 
@@ -52,8 +51,7 @@ bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
 /// an edge there, whole rings of poses, is no structure.
 bool is_nothing_but_steps(const VisitLog& log, std::size_t axis) {
   constexpr double kSoftest = 0.25;  // of a step: with more noise there is a slope between edges
-  const auto& lattice = log.codes[axis].coarser_lattice;
-  return lattice && log.input_sd_V[axis] < kSoftest * lattice->step_V;
+  return log.noise_in_coarser_steps(axis).value_or(kSoftest) < kSoftest;
 }
 
 }  // namespace

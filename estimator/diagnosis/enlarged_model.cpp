@@ -48,9 +48,11 @@ ActiveEffect with_shapes_held(ActiveEffect active) {
 
 Eigen::Index ActiveEffect::free_count() const { return std::count(free.begin(), free.end(), true); }
 
-Eigen::Index EnlargedParameters::free_count() const {
+Eigen::Index EnlargedParameters::free_count() const { return first_free(effects.size()); }
+
+Eigen::Index EnlargedParameters::first_free(std::size_t effect) const {
   Eigen::Index count = 4 * kAxes;
-  for (const ActiveEffect& active : effects) count += active.free_count();
+  for (std::size_t e = 0; e < effect; ++e) count += effects[e].free_count();
   return count;
 }
 

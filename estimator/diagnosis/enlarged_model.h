@@ -34,6 +34,8 @@ struct EnlargedParameters {
 
   /// 12 + free effect parameters.
   Eigen::Index free_count() const;
+  /// Place of the first free parameter of an effect among all of them.
+  Eigen::Index first_free(std::size_t effect) const;
   Eigen::VectorXd free_values() const;
   void set_free_values(const Eigen::VectorXd& values);
 };

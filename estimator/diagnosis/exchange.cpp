@@ -34,8 +34,7 @@ bool take_back_each_other(const SearchModel& model, std::size_t first, std::size
   constexpr Eigen::Index kTwelve = 4 * kAxisCount;
   const Eigen::MatrixXd basis = orthonormal_basis(fit.whitened_jacobian.leftCols(kTwelve));
   const auto contribution = [&](std::size_t effect) {
-    Eigen::Index column = kTwelve;
-    for (std::size_t e = 0; e < effect; ++e) column += fit.parameters.effects[e].free_count();
+    Eigen::Index column = fit.parameters.first_free(effect);
     const ActiveEffect& active = fit.parameters.effects[effect];
     const auto infos = active.effect->parameters();
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(fit.whitened_jacobian.rows());

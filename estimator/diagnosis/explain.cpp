@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <memory>
 
 #include "estimator/diagnosis/code_estimate.h"
@@ -14,9 +13,6 @@
 #include "estimator/diagnosis/stuck_bits.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/diagnosis/wander.h"
-#include "estimator/effects/catalogue.h"
-#include "estimator/effects/covariate.h"
-#include "estimator/effects/smooth_term.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/axis_tools.h"
 #include "estimator/fit/generalised_fit.h"
@@ -299,14 +295,6 @@ std::vector<double> keep_what_carries(const SearchInput& search, const SearchInp
   return gains;
 }
 
-/// Wandering of the bias that nobody has put into words.
-std::vector<NoiseDriver> wanders(const SearchInput& search, const SearchResult& found) {
-  std::vector<NoiseDriver> all;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    if (auto wander = wander_beyond_record(search, found, axis)) all.push_back(std::move(*wander));
-  return all;
-}
-
 }  // namespace
 
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -319,10 +307,13 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                            start, &input.pooled};
   Searched searched = search_readings(input, search, options);
   SearchResult& found = searched.found;
+  const auto add_noise_to = [&](Diagnosis& diagnosis, const EnlargedParameters& model) {
+    add_noise(input.noise_follows, model, diagnosis);
+    add_noise(wanders_beyond_record(search, found), model, diagnosis);
+  };
   const auto without_effects = [&]() -> std::optional<WorstError> {
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
-    add_noise(input.noise_follows, {}, result.diagnosis);
-    add_noise(wanders(search, found), {}, result.diagnosis);
+    add_noise_to(result.diagnosis, {});
     return std::nullopt;
   };
   if (found.evidence.empty()) return without_effects();
@@ -438,88 +429,10 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     diagnosis.verdict = Verdict::partly_explained;
   }
   diagnosis.axis_test = result.diagnosis.axis_test;
-  add_noise(input.noise_follows, found.fit.parameters, diagnosis);
-  add_noise(wanders(search, found), {}, diagnosis);
+  add_noise_to(diagnosis, found.fit.parameters);
   diagnosis.reason = reason_of_findings(residual, diagnosis.reason, result.after.fit_pose_rms_mps2);
   result.diagnosis = std::move(diagnosis);
   return worst;
-}
-
-namespace {
-
-/// The instances of an effect on one axis (or the head), one after the other: a parameter that was
-/// there already begins the next. Without those that lack an index or a shape.
-std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
-                                    const std::vector<EffectParameter>& reported) {
-  const auto infos = effect.parameters();
-  std::vector<std::vector<std::optional<double>>> values;
-  for (const EffectParameter& parameter : reported) {
-    if (parameter.axis && *parameter.axis != axis) continue;
-    const auto info = std::find_if(infos.begin(), infos.end(), [&](const ParameterInfo& i) {
-      return i.name == parameter.name;
-    });
-    if (info == infos.end()) continue;
-    const auto k = static_cast<std::size_t>(info - infos.begin());
-    if (values.empty() || values.back()[k]) values.emplace_back(infos.size());
-    values.back()[k] = parameter.value;
-  }
-  std::vector<ActiveEffect> found;
-  for (const auto& value : values) {
-    ActiveEffect active{&effect, axis, std::vector<double>(infos.size()),
-                        std::vector<bool>(infos.size(), false)};
-    bool whole = true;
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      active.p[k] = value[k].value_or(0);
-      whole = whole && (value[k] || infos[k].role == ParameterRole::amplitude);
-    }
-    if (whole) found.push_back(std::move(active));
-  }
-  return found;
-}
-
-void restore(const Effect& effect, const std::vector<std::size_t>& axes,
-             const std::vector<EffectParameter>& reported, EnlargedParameters& model) {
-  if (!effect.carries_over()) return;
-  const bool head = effect.subject() == Subject::head;
-  for (std::size_t axis : head ? std::vector<std::size_t>{0} : axes)
-    for (ActiveEffect& active : instances(effect, axis, reported))
-      model.effects.push_back(std::move(active));
-}
-
-}  // namespace
-
-RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
-  RestoredModel restored;
-  EnlargedParameters& parameters = restored.parameters;
-  for (std::size_t i = 0; i < kAxisCount; ++i) parameters.twelve[i] = model.final[i].value;
-  std::vector<const Effect*> named = effect_catalogue();
-  for (const auto& effect : model.own_effects) named.push_back(effect.get());
-  for (auto& effect : covariate_effects(log)) restored.owned.push_back(std::move(effect));
-  for (const FoundEffect& found : model.effects) {
-    const std::size_t before = parameters.effects.size();
-    for (const Effect* effect : named)
-      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, parameters);
-    for (const auto& effect : restored.owned) {
-      // Bias and scale form of a column share the id; the unit of c tells them apart.
-      if (effect->id() == found.id && !found.parameters.empty() &&
-          effect->parameters().front().unit == found.parameters.front().unit) {
-        restore(*effect, found.axes, found.parameters, parameters);
-      }
-    }
-    if (parameters.effects.size() == before) restored.left_out.push_back(found.id);
-  }
-  std::vector<std::unique_ptr<SmoothTerm>> terms;
-  if (!model.unlisted.empty()) terms = smooth_terms(log, SmoothTermSelection::any);
-  for (const UnlistedStructure& found : model.unlisted) {
-    if (found.is_of_noise()) continue;  // it is in no mean
-    const std::size_t before = parameters.effects.size();
-    if (const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape))
-      restore(*term, found.axes, found.parameters, parameters);
-    if (parameters.effects.size() == before)
-      restored.left_out.push_back("unlisted: " + found.driver);
-  }
-  std::move(terms.begin(), terms.end(), std::back_inserter(restored.owned));
-  return restored;
 }
 
 }  // namespace plumbline

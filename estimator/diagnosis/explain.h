@@ -37,13 +37,4 @@ struct WorstError {
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
                                   Calibration& result);
 
-/// The enlarged model that reported effects stand for, on a set with its own log.
-struct RestoredModel {
-  EnlargedParameters parameters;
-  std::vector<std::shared_ptr<const Effect>> owned;  ///< effects that exist for that set only
-  /// Names of what belonged to one run, needs a column that the set lacks, or is not known here.
-  std::vector<std::string> left_out;
-};
-RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log);
-
 }  // namespace plumbline

@@ -35,8 +35,7 @@ void place(const VisitLog& log, EffectParameter& instant) {
 std::vector<EffectParameter> report_parameters(const VisitLog& log,
                                                const EnlargedEstimate& estimate,
                                                std::size_t effect) {
-  Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
-  for (std::size_t e = 0; e < effect; ++e) row += estimate.parameters.effects[e].free_count();
+  Eigen::Index row = estimate.parameters.first_free(effect);
   const ActiveEffect& active = estimate.parameters.effects[effect];
   const auto infos = active.effect->parameters();
   std::vector<double> values = active.p;
@@ -284,7 +283,7 @@ bool changes_scatter(const EnlargedParameters& model, std::size_t axis) {
 void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters& model,
                Diagnosis& diagnosis) {
   for (const NoiseDriver& each : follows) {
-    if (changes_scatter(model, each.axis)) continue;
+    if (!each.at_random && changes_scatter(model, each.axis)) continue;
     const auto like_it = std::find_if(
         diagnosis.unlisted.begin(), diagnosis.unlisted.end(), [&](const UnlistedStructure& other) {
           return other.driver == each.driver && other.shape == each.shape;

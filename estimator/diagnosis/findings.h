@@ -24,8 +24,8 @@ void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosi
 void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
                   Diagnosis& diagnosis);
 
-/// Adds what the noise follows, but on axes where something in the model that was found changes the
-/// scatter within the dwells by itself.
+/// Adds what the noise follows, but for noise within the dwells on axes where something in the
+/// model that was found changes the scatter there by itself.
 void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters& model,
                Diagnosis& diagnosis);
 

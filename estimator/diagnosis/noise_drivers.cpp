@@ -89,9 +89,9 @@ void add_powers(const std::string& driver, const std::string& of, const Eigen::V
   shapes.push_back({driver, "parabola" + of, std::move(both)});
 }
 
-std::vector<Shape> shapes_for(const VisitLog& log, std::size_t axis) {
+std::vector<Shape> shapes_for(const std::vector<Driver>& drivers, std::size_t axis) {
   std::vector<Shape> shapes;
-  for (const Driver& driver : instantaneous_drivers(log)) {
+  for (const Driver& driver : drivers) {
     const Eigen::Map<const Eigen::VectorXd> values(driver.value[axis].data(),
                                                    std::ssize(driver.value[axis]));
     if (driver.angle) {
@@ -219,8 +219,7 @@ std::optional<NoiseDriver> from_visit_to_visit(const Scatter& scatter,
 /// Whether the codes follow the noise.
 bool shows_noise(const VisitLog& log, std::size_t axis) {
   constexpr double kSeen = 0.6;  // of a step
-  return log.codes[axis].stuck_bits.empty() && !log.codes[axis].coarser_lattice &&
-         (!log.adc || log.input_sd_V[axis] > kSeen * log.adc->lsb_V());
+  return !log.codes[axis].any() && (!log.adc || log.input_sd_V[axis] > kSeen * log.adc->lsb_V());
 }
 
 }  // namespace
@@ -231,11 +230,12 @@ std::vector<NoiseDriver> noise_drivers(const VisitLog& log, const MeasurementSet
   if (std::any_of(set.poses.begin(), set.poses.end(),
                   [](const Pose& pose) { return pose.count < kFewestReadings; }))
     return found;
+  const std::vector<Driver> drivers = instantaneous_drivers(log);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     if (!shows_noise(log, axis)) continue;
     const Scatter scatter = scatter_of(log, set, axis);
     if (!scatter.log_variance.allFinite()) continue;
-    const std::vector<Shape> shapes = shapes_for(log, axis);
+    const std::vector<Shape> shapes = shapes_for(drivers, axis);
     const double looks = static_cast<double>(kAxisCount) * (static_cast<double>(shapes.size()) + 1);
     auto of_axis = from_visit_to_visit(scatter, shapes, axis, looks, partitions);
     auto of_dwell = within_dwells(scatter, axis, looks);

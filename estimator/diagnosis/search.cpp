@@ -84,19 +84,16 @@ class Search {
     const CandidateGains gains(model_.responses(), model_.stage().fit);
     const Eigen::VectorXd first_order = gains.of_residual();
     std::vector<Scored> ranked = screen(list_, gains, first_order);
-    std::erase_if(ranked, [&](const Scored& s) {
-      const Candidate& c = list_.candidates[s.candidate];
-      return model_.is_dropped(c) || model_.is_chosen(c);
-    });
-    if (ranked.empty()) return false;
     // The number of looks hardly changes while the model grows.
     if (model_.looks() == 0)
       model_.set_looks(effective_looks(gains, list_.candidates.size(),
                                        model_.stage().fit.whitened_residual.size(), options_.seed,
                                        options_.replicates));
     std::erase_if(ranked, [&](const Scored& s) {
-      const double false_alarm = model_.false_alarm(list_.candidates[s.candidate]);
-      return false_alarm < options_.false_alarm && model_.p_of(s.log_p) > false_alarm;
+      const Candidate& c = list_.candidates[s.candidate];
+      const double false_alarm = model_.false_alarm(c);
+      return model_.is_dropped(c) || model_.is_chosen(c) ||
+             (false_alarm < options_.false_alarm && model_.p_of(s.log_p) > false_alarm);
     });
     if (ranked.empty()) return false;
     const auto surest =

@@ -22,8 +22,7 @@ bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
   if (!active.effect->within_dwell()) return false;
   const Visit& visit = log.visits.front();
   const double longest_s = kDwells * visit.step_s * static_cast<double>(visit.count);
-  Eigen::Index row = 4 * static_cast<Eigen::Index>(kAxisCount);
-  for (std::size_t e = 0; e < effect; ++e) row += fit.parameters.effects[e].free_count();
+  Eigen::Index row = fit.parameters.first_free(effect);
   const auto infos = active.effect->parameters();
   for (std::size_t k = 0; k < infos.size(); ++k) {
     if (infos[k].role == ParameterRole::shape && infos[k].unit == "s") {
@@ -100,8 +99,7 @@ double SearchModel::p_of(double log_p_local) const { return p_of_search(log_p_lo
 
 bool SearchModel::shows_steps(std::size_t axis) const {
   constexpr double kFew = 0.5;  // of a step: with more noise the edges are washed out
-  const auto& lattice = input_.log.codes[axis].coarser_lattice;
-  return lattice && input_.log.input_sd_V[axis] < kFew * lattice->step_V;
+  return input_.log.noise_in_coarser_steps(axis).value_or(kFew) < kFew;
 }
 
 double SearchModel::false_alarm(const Candidate& candidate) const {

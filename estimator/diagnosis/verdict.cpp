@@ -50,6 +50,12 @@ std::vector<Diagnosis::Finding> Diagnosis::findings() const {
   return all;
 }
 
+bool Diagnosis::enlarges_model() const {
+  return !effects.empty() ||
+         std::any_of(unlisted.begin(), unlisted.end(),
+                     [](const UnlistedStructure& found) { return !found.is_of_noise(); });
+}
+
 bool is_unexplained(const VerdictInput& input, std::size_t axis) {
   return input.poses >= kFewestPosesToDecide && obstacle(input, axis).empty() &&
          input.axis[axis].p_value < kFalseAlarmShare / static_cast<double>(kAxisCount);

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "estimator/diagnosis/heldout.h"
 #include "estimator/diagnosis/screening.h"
 #include "estimator/linear_algebra.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
@@ -58,42 +61,53 @@ double gain_of_other_half(const NoiseProcesses& processes, const NoiseModel& rec
   return share_removed(without, with, expected);
 }
 
-}  // namespace
-
-std::optional<NoiseDriver> wander_beyond_record(const SearchInput& input, const SearchResult& found,
-                                                std::size_t axis) {
+std::optional<NoiseDriver> wander(const SearchInput& input, std::size_t axis,
+                                  const Eigen::VectorXd& start, const Left& left) {
   constexpr double kFalseAlarm = 1e-6;
   constexpr double kMatters = 1.5;  // ratio of standard deviations
-  const CodeFaults& codes = input.log.codes[axis];
-  if (found.coarse[axis] || codes.coarser_lattice || !codes.stuck_bits.empty()) return {};
-  const auto n = std::ssize(input.log.visits);
-  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, found.fit.parameters);
-  const Left left{
-      found.observed.mean_V[axis] - predict_means_V(input.log, found.fit.parameters)[axis],
-      found.own_V2[axis],
-      orthonormal_basis(jacobian.middleRows(static_cast<Eigen::Index>(axis) * n, n))};
   const NoiseModel& record = input.noise[axis];
   const NoisePool pool(input.processes, record, left.own_V2);
-  const auto each =
-      pool.contradiction(pool.pool(left.residual_V, left.design, &found.noise[axis].power),
-                         left.residual_V, left.design);
+  const auto each = pool.contradiction(pool.pool(left.residual_V, left.design, &start),
+                                       left.residual_V, left.design);
   if (!each) return {};
+  const double log_p = log_chi_squared_tail(std::max(0.0, each->deviance),
+                                            static_cast<double>(input.processes.count()));
+  NoiseDriver driver{axis, "t_s", "noise, wandering beyond the static record"};
+  driver.at_random = true;
+  driver.p_value = p_of_search(log_p, kAxisCount);
+  driver.sigmas = sigmas_of(log_p);
+  if (!(driver.p_value < kFalseAlarm)) return {};
   const auto left_by = [&](const Eigen::VectorXd& power) {
     const Eigen::MatrixXd V = pool.covariance(power);
     return V.trace() - left.design.cwiseProduct(V * left.design).sum();
   };
-  const double log_p = log_chi_squared_tail(std::max(0.0, each->deviance),
-                                            static_cast<double>(input.processes.count()));
-  NoiseDriver wander{axis, "t_s", "noise, wandering beyond the static record"};
-  wander.at_random = true;
-  wander.p_value = p_of_search(log_p, kAxisCount);
-  wander.sigmas = sigmas_of(log_p);
-  wander.ratio = std::sqrt(left_by(each->power_of_run) / left_by(each->power_of_record));
-  if (!(wander.p_value < kFalseAlarm) || !(wander.ratio > kMatters)) return {};
-  wander.u_ratio = wander.ratio * std::log(wander.ratio) / std::sqrt(each->deviance);
-  wander.heldout_gain = gain_of_other_half(input.processes, record, *each, left);
-  if (!(wander.heldout_gain > 0)) return {};
-  return wander;
+  driver.ratio = std::sqrt(left_by(each->power_of_run) / left_by(each->power_of_record));
+  if (!(driver.ratio > kMatters)) return {};
+  driver.u_ratio = driver.ratio * std::log(driver.ratio) / std::sqrt(each->deviance);
+  driver.heldout_gain = gain_of_other_half(input.processes, record, *each, left);
+  if (!(driver.heldout_gain > 0)) return {};
+  return driver;
+}
+
+}  // namespace
+
+std::vector<NoiseDriver> wanders_beyond_record(const SearchInput& input,
+                                               const SearchResult& found) {
+  const auto n = std::ssize(input.log.visits);
+  const PerAxis<Eigen::VectorXd> predicted_V = predict_means_V(input.log, found.fit.parameters);
+  const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, found.fit.parameters);
+  PerAxis<std::optional<NoiseDriver>> of_axis;
+  parallel_for(kAxisCount, [&](std::size_t axis) {
+    if (found.coarse[axis] || input.log.codes[axis].any()) return;
+    const auto block = jacobian.middleRows(static_cast<Eigen::Index>(axis) * n, n);
+    of_axis[axis] = wander(input, axis, found.noise[axis].power,
+                           {found.observed.mean_V[axis] - predicted_V[axis], found.own_V2[axis],
+                            orthonormal_basis(block)});
+  });
+  std::vector<NoiseDriver> all;
+  for (auto& found_there : of_axis)
+    if (found_there) all.push_back(std::move(*found_there));
+  return all;
 }
 
 }  // namespace plumbline

@@ -112,8 +112,7 @@ class Quantization final : public Effect {
   /// Whether readings near an edge between two codes tell where it lies: there is noise that takes
   /// them over it, and not so much that all edges are one.
   static bool shows_finer_step(const VisitLog& log, std::size_t axis) {
-    if (!log.adc || log.codes[axis].coarser_lattice || !log.codes[axis].stuck_bits.empty())
-      return false;
+    if (!log.adc || log.codes[axis].any()) return false;
     const double noise = log.input_sd_V[axis] / log.adc->lsb_V();
     return noise > kLeastOfStep && noise < kMostOfStep;
   }

@@ -66,6 +66,7 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
 struct CodeFaults {
   std::vector<StuckBit> stuck_bits;
   std::optional<Lattice> coarser_lattice;
+  bool any() const { return coarser_lattice || !stuck_bits.empty(); }
 };
 CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& adc);
 

@@ -182,29 +182,6 @@ class SawTooth final : public DrivenTerm {
     if (of_codes || (of_time && target().form == TermForm::bias)) from_falls(instances, found);
     return found;
   }
-  /// Falls that were found one by one.
-  void from_falls(const std::vector<std::vector<double>>& falls,
-                  std::vector<Hypothesis>& found) const {
-    std::vector<double> places;
-    for (const auto& fall : falls) places.push_back(fall[1]);
-    std::sort(places.begin(), places.end());
-    for (std::size_t k = 1; k < places.size(); ++k)
-      found.push_back({{edge(), places[k] - places[k - 1], places[k], target().typical_size()}});
-    if (places.size() < 3) return;
-    // The straight line through all of them; some teeth may be missing.
-    double shortest = places.back() - places.front();
-    for (std::size_t k = 1; k < places.size(); ++k)
-      shortest = std::min(shortest, places[k] - places[k - 1]);
-    const auto count = static_cast<Eigen::Index>(places.size());
-    const Eigen::Map<const Eigen::ArrayXd> at(places.data(), count);
-    const Eigen::ArrayXd tooth = ((at - at(0)) / shortest).round();
-    const Eigen::ArrayXd off = tooth - tooth.mean();
-    const double period = (off * (at - at.mean())).sum() / off.square().sum();
-    // A step in time is told from the visit that follows it.
-    const double before = variable().is_clock() ? 2 * part_of_spacing() : 0;
-    found.push_back(
-        {{edge(), period, at.mean() - period * tooth.mean() - before, target().typical_size()}});
-  }
   std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
                                  const Hypothesis& found) const override {
     constexpr int kPlaces = 4;
@@ -233,6 +210,29 @@ class SawTooth final : public DrivenTerm {
   static constexpr double kFine = 0.1;
   /// Noise of single readings reaches over a fall; between two visits it could not be moved.
   double edge() const { return variable().scatter > 0 ? variable().scatter : part_of_spacing(); }
+  /// Falls that were found one by one.
+  void from_falls(const std::vector<std::vector<double>>& falls,
+                  std::vector<Hypothesis>& found) const {
+    std::vector<double> places;
+    for (const auto& fall : falls) places.push_back(fall[1]);
+    std::sort(places.begin(), places.end());
+    for (std::size_t k = 1; k < places.size(); ++k)
+      found.push_back({{edge(), places[k] - places[k - 1], places[k], target().typical_size()}});
+    if (places.size() < 3) return;
+    // The straight line through all of them; some teeth may be missing.
+    double shortest = places.back() - places.front();
+    for (std::size_t k = 1; k < places.size(); ++k)
+      shortest = std::min(shortest, places[k] - places[k - 1]);
+    const auto count = static_cast<Eigen::Index>(places.size());
+    const Eigen::Map<const Eigen::ArrayXd> at(places.data(), count);
+    const Eigen::ArrayXd tooth = ((at - at(0)) / shortest).round();
+    const Eigen::ArrayXd off = tooth - tooth.mean();
+    const double period = (off * (at - at.mean())).sum() / off.square().sum();
+    // A step in time is told from the visit that follows it.
+    const double before = variable().is_clock() ? 2 * part_of_spacing() : 0;
+    found.push_back(
+        {{edge(), period, at.mean() - period * tooth.mean() - before, target().typical_size()}});
+  }
   void add(double period, std::vector<Hypothesis>& starts) const {
     constexpr int kPlaces = 6;
     for (int k = 0; k < kPlaces; ++k)

@@ -38,10 +38,9 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
   }
   const Eigen::MatrixXd& W = powers.covariance;
   const double slow = probability_of_slow_noise(powers.gain_of_slow);
-  constexpr Eigen::Index kFirstSlow = kTermB;
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto a = static_cast<std::size_t>(i);
-    if (i >= kFirstSlow) result.M -= (1 - slow) * powers.power(i) * P[a];
+    if (i >= NoiseProcesses::kFirstSlow) result.M -= (1 - slow) * powers.power(i) * P[a];
     for (Eigen::Index j = 0; j < count; ++j) {
       const auto b = static_cast<std::size_t>(j);
       result.M += 2 * slow * W(i, j) * (Z[a].transpose() * Z[b] - P[a] * C * P[b]);

@@ -17,8 +17,7 @@ namespace plumbline {
 
 namespace {
 
-constexpr Eigen::Index kFirstSlow = kTermB;  // among the processes
-constexpr double kMarkovRatio = 4;           // of neighbouring correlation times
+constexpr double kMarkovRatio = 4;  // of neighbouring correlation times
 
 /// Looks at the lower triangle only.
 bool has_diagonal_only(const Eigen::MatrixXd& covariance) {
@@ -323,8 +322,7 @@ Eigen::VectorXd NoisePool::starting_powers() const {
 PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
                             const Eigen::VectorXd* start) const {
   assert(mean.size() == design.rows() && mean.size() > design.cols());
-  std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
-  free[kTermQ] = quantization_is_free();
+  const std::vector<bool> free = free_powers();
   Eigen::VectorXd first = starting_powers();
   if (!free[kTermQ]) first(kTermQ) = 0;
   // Powers that were found to be zero need a little to find the way back.
@@ -335,7 +333,7 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
 double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
   Eigen::VectorXd first = found.power;
-  first.tail(first.size() - kFirstSlow).setZero();
+  first.tail(first.size() - NoiseProcesses::kFirstSlow).setZero();
   if (first.sum() <= 0 && !own_noise_) return std::numeric_limits<double>::infinity();
   std::vector<bool> free(static_cast<std::size_t>(first.size()), false);
   free[kTermQ] = quantization_is_free();
@@ -384,9 +382,7 @@ std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
                                                       const Eigen::VectorXd& mean,
                                                       const Eigen::MatrixXd& design) const {
   if (densities_.size() == 0) return std::nullopt;
-  std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
-  free[kTermQ] = quantization_is_free();
-  const Climb of_record = climb(starting_powers(), free,
+  const Climb of_record = climb(starting_powers(), free_powers(),
                                 [&](const Eigen::VectorXd& power) { return record_at(power); });
   const PooledNoise of_run =
       NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);

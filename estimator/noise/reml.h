@@ -16,9 +16,10 @@ namespace plumbline {
 /// of real flicker, of several relaxations or of walks that level off, is a sum of these.
 struct NoiseProcesses {
   static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
-  std::vector<double> decay_per_s;                 ///< of the Gauss-Markov processes, slowest first
-  std::vector<Eigen::MatrixXd> unit;               ///< covariance of the window means, power 1
-  std::vector<bool> is_diagonal;                   ///< of each: without memory between windows
+  static constexpr Eigen::Index kFirstSlow = kTermB;
+  std::vector<double> decay_per_s;    ///< of the Gauss-Markov processes, slowest first
+  std::vector<Eigen::MatrixXd> unit;  ///< covariance of the window means, power 1
+  std::vector<bool> is_diagonal;      ///< of each: without memory between windows
 
   Eigen::Index count() const { return std::ssize(unit); }
 };
@@ -99,6 +100,12 @@ class NoisePool {
   /// The window means cannot tell quantization from white noise: without a record it stays at zero.
   bool quantization_is_free() const {
     return densities_.size() > 0 && densities_.col(kTermQ).sum() > 0;
+  }
+  /// All but that.
+  std::vector<bool> free_powers() const {
+    std::vector<bool> free(static_cast<std::size_t>(processes_->count()), true);
+    free[kTermQ] = quantization_is_free();
+    return free;
   }
   /// By how much −2 ln of the restricted likelihood is better with the slow processes of `found`
   /// than without any.

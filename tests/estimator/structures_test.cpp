@@ -36,6 +36,22 @@ UnlistedStructure expect_only_structure(const SyntheticOptions& options,
   return found;
 }
 
+/// What a value was when the head rested at the pose before.
+class AtPoseBefore {
+ public:
+  /// `now`: at time `t_s`.
+  double operator()(double now, double t_s) {
+    constexpr double kBetweenPoses_s = 1;
+    if (t_s > last_s_ + kBetweenPoses_s) before_ = at_;
+    at_ = now;
+    last_s_ = t_s;
+    return before_;
+  }
+
+ private:
+  double before_ = 0, at_ = 0, last_s_ = 0;
+};
+
 TEST(Structure, AnAxisThatWasStruckHasAnotherScaleFromThenOn) {
   SyntheticOptions options;
   options.more_x_V = [](const auto& a_g, double t_s) { return t_s < 150 ? 0 : 1e-3 * a_g[0]; };
@@ -175,13 +191,8 @@ TEST(Structure, WhatAPoseLeavesForGoodIsNoSettling) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [before_g = 0.0, at_g = 0.0, last_s = 0.0](const auto& a_g,
-                                                                double t_s) mutable {
-    constexpr double kBetweenPoses_s = 1;
-    if (t_s > last_s + kBetweenPoses_s) before_g = at_g;
-    at_g = a_g[0];
-    last_s = t_s;
-    return 1e-3 * (before_g - at_g);
+  options.more_x_V = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+    return 1e-3 * (before(a_g[0], t_s) - a_g[0]);
   };
   expect_only_structure(
       options, {"previous_pose", "bias", "polynomial of degree 1 in the change of a_i since"});
@@ -212,14 +223,9 @@ TEST(Structure, WhatDependsOnTheWaySaysNothingOfTheFirstPose) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [h_rad = 0.0, change_rad = 0.0, last_s = 0.0](const auto& a_g,
-                                                                   double t_s) mutable {
-    constexpr double kBetweenPoses_s = 1;
-    const double to_rad = std::atan2(a_g[2], std::hypot(a_g[0], a_g[1]));
-    if (t_s > last_s + kBetweenPoses_s) change_rad = to_rad - h_rad;
-    h_rad = to_rad;
-    last_s = t_s;
-    return 2e-3 * change_rad;
+  options.more_x_V = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+    const double h_rad = std::atan2(a_g[2], std::hypot(a_g[0], a_g[1]));
+    return 2e-3 * (h_rad - before(h_rad, t_s));
   };
   expect_only_structure(
       options, {"previous_pose", "bias", "polynomial of degree 1 in the change of h since"});
@@ -267,13 +273,8 @@ TEST(Structure, WhatAnotherAxisFeltBeforeIsOneStraightLine) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [before_g = 0.0, at_g = 0.0, last_s = 0.0](const auto& a_g,
-                                                                double t_s) mutable {
-    constexpr double kBetweenPoses_s = 1;
-    if (t_s > last_s + kBetweenPoses_s) before_g = at_g;
-    at_g = a_g[1];
-    last_s = t_s;
-    return 1e-3 * before_g;
+  options.more_x_V = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+    return 1e-3 * before(a_g[1], t_s);
   };
   expect_only_structure(
       options, {"previous_pose", "bias",

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "estimator/diagnosis/enlarged_model.h"
-#include "estimator/diagnosis/explain.h"
+#include "estimator/diagnosis/restored_model.h"
 #include "estimator/error_figures.h"
 #include "estimator/pose_means.h"
 #include "rig/sim/effects/effect.h"

@@ -10,7 +10,7 @@
 
 #include "app/figure/plot.h"
 #include "app/figure/svg_canvas.h"
-#include "estimator/diagnosis/explain.h"
+#include "estimator/diagnosis/restored_model.h"
 #include "estimator/error_figures.h"
 #include "estimator/pose_means.h"
 #include "estimator/scalar/calibrate_scalar.h"
