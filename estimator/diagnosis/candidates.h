@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/diagnosis/enlarged_fit.h"
 
 namespace plumbline {
 

@@ -1,11 +1,9 @@
 #include "estimator/diagnosis/enlarged_model.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -274,44 +272,6 @@ Eigen::Index stacked_rows(const VisitLog& log) {
 
 namespace {
 
-bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, std::size_t k) {
-  return active.free[k] && info.role == ParameterRole::shape && !info.place;
-}
-
-// Time constants, widths and the like keep their sign, and sensitivities about their size: no
-// effect takes their place.
-bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
-  constexpr double kLargestChange = 3;  // as a ratio
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const auto own = static_cast<Eigen::Index>(i);
-    const double ratio = trial.twelve[i](own) / start.twelve[i](own);
-    if (!(ratio > 1 / kLargestChange && ratio < kLargestChange)) return false;
-  }
-  for (std::size_t e = 0; e < trial.effects.size(); ++e) {
-    const ActiveEffect& active = trial.effects[e];
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (has_a_sign_to_keep(active, infos[k], k) && !(active.p[k] * start.effects[e].p[k] > 0))
-        return false;
-  }
-  return true;
-}
-
-/// A time constant that the readings hardly determine must not hold up all others by running across
-/// zero: it stops short of that.
-void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& trial) {
-  constexpr double kLeastLeft = 0.1;
-  for (std::size_t e = 0; e < trial.effects.size(); ++e) {
-    ActiveEffect& active = trial.effects[e];
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      const double least = kLeastLeft * from.effects[e].p[k];
-      if (has_a_sign_to_keep(active, infos[k], k) && !(active.p[k] / least > 1))
-        active.p[k] = least;
-    }
-  }
-}
-
 Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
                         const PerAxis<Eigen::MatrixXd>& dwell_V) {
   const Eigen::Index n = mean_V[0].size();
@@ -346,6 +306,10 @@ std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters)
 }
 
 }  // namespace
+
+Eigen::VectorXd stacked_V(const Observations& observed) {
+  return stacked(observed.mean_V, observed.dwell_V);
+}
 
 Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters) {
   const Forces a_g = specific_forces_g(log, parameters);
@@ -388,133 +352,6 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
         (2 * step);
   });
   return jacobian;
-}
-
-void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
-  lower[axis] = Eigen::LLT<Eigen::MatrixXd>(covariance_V2).matrixL();
-  inverse[axis] = inverse_of_triangle(lower[axis]);
-}
-
-void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const {
-  // What concerns later visits only is zero before them, and stays so.
-  Eigen::Index first = 0;
-  while (first < means_V.rows() && (means_V.row(first).array() == 0).all()) ++first;
-  const Eigen::Index rest = means_V.rows() - first;
-  if (rest == 0) return;  // OpenBLAS complains of empty products
-  // So do the columns of a Jacobian that belong to other axes.
-  std::vector<Eigen::Index> seen;
-  for (Eigen::Index j = 0; j < means_V.cols(); ++j)
-    if ((means_V.col(j).array() != 0).any()) seen.push_back(j);
-  const Eigen::MatrixXd concerned = means_V(Eigen::lastN(rest), seen);
-  means_V(Eigen::lastN(rest), seen) =
-      inverse[axis].bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() * concerned;
-}
-
-Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
-  Eigen::MatrixXd whitened = all;
-  const Eigen::Index n = lower[0].rows();
-  parallel_for(kAxisCount, [&](std::size_t axis) {
-    const auto i = static_cast<Eigen::Index>(axis);
-    apply_to_means(axis, whitened.middleRows(i * n, n));
-    const Eigen::Index contrasts = dwell_sd_V[axis].size();
-    for (Eigen::Index d = 0; d < contrasts; ++d)
-      whitened.middleRows((kAxes + i * contrasts + d) * n, n) /= dwell_sd_V[axis](d);
-  });
-  return whitened;
-}
-
-EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
-                         const PoseWhitening& whitening, const EnlargedParameters& start,
-                         int most_iterations) {
-  constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
-  const Eigen::Index rows =
-      has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
-  const Eigen::VectorXd measured = stacked(observed.mean_V, observed.dwell_V);
-  const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
-    return whitening.apply(measured - predict_stacked_V(log, parameters));
-  };
-  EnlargedFit fit;
-  fit.parameters = start;
-  fit.whitened_residual = whitened_residual(start);
-  fit.chi2 = fit.whitened_residual.squaredNorm();
-  for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
-    fit.whitened_jacobian = whitening.apply(prediction_jacobian(log, fit.parameters));
-    const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
-    fit.determined = norms.minCoeff() > 0;
-    if (!fit.determined) return fit;
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
-                                                         norms.cwiseInverse().asDiagonal());
-    const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
-    fit.determined = diagonal.minCoeff() > kDetermined * diagonal.maxCoeff();
-    if (!fit.determined) return fit;
-
-    const Eigen::VectorXd step =
-        norms.cwiseInverse().cwiseProduct(qr.solve(fit.whitened_residual.head(rows)));
-    bool improved = false, refused = false;
-    const auto try_steps = [&](bool stopping_short) {
-      double share = 1;
-      for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
-        EnlargedParameters trial = fit.parameters;
-        trial.set_free_values(fit.parameters.free_values() + share * step);
-        if (stopping_short) stop_short_of_zero(fit.parameters, trial);
-        if (!makes_sense(trial, start)) {
-          refused = true;
-          continue;
-        }
-        const Eigen::VectorXd residual = whitened_residual(trial);
-        const double chi2 = residual.squaredNorm();
-        if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;
-        improved = true;
-        fit.converged = fit.chi2 - chi2 < 1e-6;
-        fit.parameters = trial;
-        fit.whitened_residual = residual;
-        fit.chi2 = chi2;
-      }
-    };
-    try_steps(false);
-    if (!improved && refused) try_steps(true);
-    if (!improved) fit.converged = true;  // no direction leads down any more
-  }
-  const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
-                                                 norms.cwiseInverse().asDiagonal());
-  const Eigen::MatrixXd r = qr.matrixQR().topRows(norms.size()).triangularView<Eigen::Upper>();
-  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(r.rows(), r.cols());
-  r.triangularView<Eigen::Upper>().solveInPlace(inverse);
-  inverse = norms.cwiseInverse().asDiagonal() * inverse;
-  fit.covariance = inverse * inverse.transpose();
-  return fit;
-}
-
-EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
-                               const PoseWhitening& whitening, const EnlargedParameters& start,
-                               std::size_t first_new) {
-  EnlargedFit fit = fit_enlarged(log, observed, whitening, start);
-  if (fit.determined) return fit;
-  EnlargedParameters held = fit.parameters;
-  for (std::size_t e = first_new; e < held.effects.size(); ++e)
-    held.effects[e] = with_shapes_held(held.effects[e]);
-  return fit_enlarged(log, observed, whitening, held);
-}
-
-EnlargedFit fit_from_levels(const VisitLog& log, const Observations& observed,
-                            const PoseWhitening& whitening, const EnlargedParameters& start) {
-  constexpr int kLevels = 16;
-  const std::size_t axis = start.effects.back().axis;
-  EnlargedParameters without = start;
-  without.effects.pop_back();
-  const Eigen::VectorXd change =
-      predict_means_V(log, start)[axis] - predict_means_V(log, without)[axis];
-  const double swing_V = change.maxCoeff() - change.minCoeff();
-  EnlargedFit best;
-  best.determined = false;
-  for (int level = -kLevels; level <= kLevels; ++level) {
-    EnlargedParameters shifted = start;
-    shifted.twelve[axis](3) += swing_V * level / kLevels;
-    EnlargedFit with = fit_enlarged(log, observed, whitening, shifted);
-    if (with.determined && (!best.determined || with.chi2 < best.chi2)) best = std::move(with);
-  }
-  return best;
 }
 
 }  // namespace plumbline

@@ -1,4 +1,4 @@
-// The 12-parameter model enlarged by effects: predicted pose means and their joint estimation.
+// The 12-parameter model enlarged by effects: predicted pose means and courses of the dwells.
 #pragma once
 
 #include <Eigen/Core>
@@ -99,58 +99,13 @@ Observations observe(const MeasurementSet& set, const VisitLog& log);
 Eigen::Index mean_rows(const VisitLog& log);
 Eigen::Index stacked_rows(const VisitLog& log);
 
-/// The prediction as such a vector, V.
+/// Measured, V.
+Eigen::VectorXd stacked_V(const Observations& observed);
+/// Predicted, V.
 Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters);
 
 /// Derivatives of the stacked prediction by the free parameters, by central differences with steps
 /// fitted to each parameter's size.
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters);
-
-/// n × n lower Cholesky factors of the pose-mean covariance per axis with their inverses, and the
-/// standard deviations of the contrasts, which are independent from visit to visit.
-struct PoseWhitening {
-  PerAxis<Eigen::MatrixXd> lower, inverse;
-  PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< one a contrast
-  /// Takes over the covariance of one axis.
-  void set(std::size_t axis, const Eigen::MatrixXd& covariance_V2);
-  /// Whitens n rows, the means of one axis, in place.
-  void apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const;
-  /// Whitens a matrix of stacked rows.
-  Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
-};
-
-struct EnlargedEstimate {
-  EnlargedParameters parameters;
-  Eigen::MatrixXd covariance;  ///< of the free parameters
-};
-
-struct EnlargedFit : EnlargedEstimate {
-  Eigen::VectorXd whitened_residual;  ///< stacked
-  Eigen::MatrixXd whitened_jacobian;  ///< stacked × free
-  double chi2 = 0;
-  bool converged = false;
-  bool determined = true;  ///< no direction of the free parameters is unobservable
-};
-
-/// Of a fit that is to settle.
-inline constexpr int kMostIterations = 20;
-
-/// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
-/// factorisation).
-EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
-                         const PoseWhitening& whitening, const EnlargedParameters& start,
-                         int most_iterations = kMostIterations);
-
-/// The same; where that leaves something undetermined, the shapes of the effects from `first_new`
-/// on stay where they ended up: a boundary between two readings, say, that the visits do not place.
-EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
-                               const PoseWhitening& whitening, const EnlargedParameters& start,
-                               std::size_t first_new);
-
-/// The best of the same fits from several levels U_0 of the axis of the last effect, as far apart
-/// as the effect swings: what follows the codes hangs on the level more finely than the level is
-/// known without it. Not determined where none is.
-EnlargedFit fit_from_levels(const VisitLog& log, const Observations& observed,
-                            const PoseWhitening& whitening, const EnlargedParameters& start);
 
 }  // namespace plumbline

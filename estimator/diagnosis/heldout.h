@@ -1,7 +1,7 @@
 // Errors of the enlarged model on poses that were left out of its fit.
 #pragma once
 
-#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/diagnosis/enlarged_fit.h"
 #include "estimator/error_figures.h"
 
 namespace plumbline {

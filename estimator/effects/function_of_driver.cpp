@@ -168,8 +168,10 @@ class Wave final : public DrivenTerm {
     const auto [low, high] = range();
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    if (is_of_another_axis(axis)) return starts;
-    const auto steps = std::lround((cycles_.most - cycles_.least) / cycles_.step);
+    constexpr double kMostOfAnother = 8;
+    const double most =
+        is_of_another_axis(axis) ? std::min(kMostOfAnother, cycles_.most) : cycles_.most;
+    const auto steps = std::lround((most - cycles_.least) / cycles_.step);
     for (long k = 0; k <= steps; ++k) {
       const double period = (high - low) / (cycles_.least + static_cast<double>(k) * cycles_.step);
       const bool is_seen = !variable().component || resolves(static_cast<int>(k) + 2);

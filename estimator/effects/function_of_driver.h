@@ -85,4 +85,14 @@ std::unique_ptr<SmoothTerm> logarithm(DriverPointer driver, const Target& target
 /// What follows the driver through a play of unknown width lags behind it by this function.
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
 
+/// A harmonic of an angle, with amplitude and phase in a straight line of the driver.
+std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
+                                                const Target& target);
+/// Two straight lines and their product.
+std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
+                                            const Target& target);
+/// The products of a harmonic of one angle and a harmonic of another.
+std::unique_ptr<SmoothTerm> harmonic_times_harmonic(DriverPointer angle, DriverPointer other,
+                                                    const Target& target);
+
 }  // namespace plumbline

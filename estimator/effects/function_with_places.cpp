@@ -221,6 +221,14 @@ class Step final : public DrivenTerm {
       others.push_back({{found.p[0] + 0.25 * place * found.p[1], kSharp * found.p[1], found.p[2]}});
     return others;
   }
+  std::optional<std::size_t> sets_in_at(const VisitLog&,
+                                        const std::vector<double>& p) const override {
+    if (!variable().is_clock()) return {};
+    const std::vector<double>& t_s = variable().value[0];
+    const auto next = std::upper_bound(t_s.begin(), t_s.end(), p[0]);
+    if (next == t_s.begin() || next == t_s.end() || 2 * p[1] > *next - *(next - 1)) return {};
+    return static_cast<std::size_t>(next - t_s.begin());
+  }
 
  private:
   std::string function() const override { return "step"; }

@@ -74,6 +74,7 @@ class TermList {
       // A variable that never varied drives nothing.
       if (any_ || driver->varies()) add_of(driver);
     }
+    add_of_two();
     for (Driver& each : changes_of_others(log_)) {
       const auto driver = std::make_shared<const Driver>(std::move(each));
       if (any_ || driver->varies()) add_polynomials(driver, kBias, {1});
@@ -116,6 +117,8 @@ class TermList {
 
   void add_of(const DriverPointer& driver) {
     const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
+    if (driver->angle || driver->name == "h_deg") angles_.push_back(driver);
+    if (clock) clock_ = driver;
     if (driver->two_valued) {
       for (const Target& target : {kBias, kScale, kH}) add_polynomials(driver, target, {1});
       return;
@@ -219,6 +222,20 @@ class TermList {
         add(harmonic(delta, target, 1));
       }
   }
+  /// Where the visits' positions are not the only thing that a pattern over them follows.
+  void add_of_two() {
+    if (angles_.size() == 2) add(harmonic_times_harmonic(angles_[0], angles_[1], kBias));
+    std::vector<DriverPointer> followed = columns_;
+    if (clock_) followed.push_back(clock_);
+    for (const DriverPointer& driver : followed)
+      for (const DriverPointer& angle : angles_) {
+        add(line_times_harmonic(driver, angle, kBias));
+        add(line_times_harmonic(driver, angle, angle->angle ? kDelta : kH));
+      }
+    for (std::size_t one = 0; one < columns_.size(); ++one)
+      for (std::size_t other = one + 1; other < columns_.size(); ++other)
+        add(line_times_line(columns_[one], columns_[other], kBias));
+  }
   /// What winds up with the spindle does not know that 360° are 0°.
   void add_of_wound_up_spindle() {
     const auto turn = std::make_shared<const Driver>(angle_without_return(log_));
@@ -239,6 +256,8 @@ class TermList {
   const VisitLog& log_;
   bool any_;
   std::vector<DriverPointer> columns_;  ///< recorded, but for their rates
+  std::vector<DriverPointer> angles_;   ///< delta, then h
+  DriverPointer clock_;
   std::vector<std::unique_ptr<SmoothTerm>> terms_;
 };
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <memory>
 
-#include "estimator/diagnosis/enlarged_model.h"
+#include "estimator/diagnosis/enlarged_fit.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/error_figures.h"

@@ -1,0 +1,59 @@
+// The parameters of an enlarged model and its noise fitted to what was measured.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "estimator/diagnosis/enlarged_model.h"
+
+namespace plumbline {
+
+/// n × n lower Cholesky factors of the pose-mean covariance per axis with their inverses, and the
+/// standard deviations of the contrasts, which are independent from visit to visit.
+struct PoseWhitening {
+  PerAxis<Eigen::MatrixXd> lower, inverse;
+  PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< one a contrast
+  /// Takes over the covariance of one axis.
+  void set(std::size_t axis, const Eigen::MatrixXd& covariance_V2);
+  /// Whitens n rows, the means of one axis, in place.
+  void apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const;
+  /// Whitens a matrix of stacked rows.
+  Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
+};
+
+struct EnlargedEstimate {
+  EnlargedParameters parameters;
+  Eigen::MatrixXd covariance;  ///< of the free parameters
+};
+
+struct EnlargedFit : EnlargedEstimate {
+  Eigen::VectorXd whitened_residual;  ///< stacked
+  Eigen::MatrixXd whitened_jacobian;  ///< stacked × free
+  double chi2 = 0;
+  bool converged = false;
+  /// No direction of the free parameters is unobservable, the effects are no large differences of
+  /// each other, and they leave no sensitivity open.
+  bool determined = true;
+};
+
+/// Of a fit that is to settle.
+inline constexpr int kMostIterations = 20;
+
+/// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
+/// factorisation).
+EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
+                         const PoseWhitening& whitening, const EnlargedParameters& start,
+                         int most_iterations = kMostIterations);
+
+/// The same; where that leaves something undetermined, the shapes of the effects from `first_new`
+/// on stay where they ended up: a boundary between two readings, say, that the visits do not place.
+EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
+                               const PoseWhitening& whitening, const EnlargedParameters& start,
+                               std::size_t first_new);
+
+/// The best of the same fits from several levels U_0 of the axis of the last effect, as far apart
+/// as the effect swings: what follows the codes hangs on the level more finely than the level is
+/// known without it. Not determined where none is.
+EnlargedFit fit_from_levels(const VisitLog& log, const Observations& observed,
+                            const PoseWhitening& whitening, const EnlargedParameters& start);
+
+}  // namespace plumbline

@@ -1,0 +1,144 @@
+// What depends on two variables at once.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "estimator/effects/driven_term.h"
+
+namespace plumbline {
+namespace {
+
+constexpr int kHighest = 6;  // harmonic: what is finer has too many companions to be told from them
+
+/// From −1 to 1 over a range.
+double position(double value, double low, double high) {
+  return (2 * value - low - high) / (high - low);
+}
+
+/// A harmonic of an angle whose amplitude and phase follow another variable in a straight line.
+class LineTimesHarmonic final : public DrivenTerm {
+ public:
+  LineTimesHarmonic(DriverPointer driver, DriverPointer angle, Target target)
+      : DrivenTerm(std::move(driver), target), angle_(std::move(angle)) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", "", ParameterRole::index},
+            {"high", "", ParameterRole::index},
+            {"n", "", ParameterRole::index},
+            {"c0", target().unit(), ParameterRole::amplitude},
+            {"s0", target().unit(), ParameterRole::amplitude},
+            {"c1", target().unit(), ParameterRole::amplitude},
+            {"s1", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    const double size = target().typical_size();
+    std::vector<Hypothesis> starts;
+    if (!angle_->varies()) return starts;
+    for (int n = 1; n <= kHighest; ++n)
+      starts.push_back({{low, high, static_cast<double>(n), size, size, size, size}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override {
+    return "straight line, times a harmonic of " + angle_->name;
+  }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double x = position(variable().value[axis][visit], p[0], p[1]);
+    const double phase = p[2] * angle_->value[axis][visit];
+    return (p[3] + x * p[5]) * std::cos(phase) + (p[4] + x * p[6]) * std::sin(phase);
+  }
+
+  DriverPointer angle_;
+};
+
+/// With what each does by itself: where its zero lies nobody knows.
+class LineTimesLine final : public DrivenTerm {
+ public:
+  LineTimesLine(DriverPointer driver, DriverPointer other, Target target)
+      : DrivenTerm(std::move(driver), target), other_(std::move(other)) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", "", ParameterRole::index},
+            {"high", "", ParameterRole::index},
+            {"other_low", "", ParameterRole::index},
+            {"other_high", "", ParameterRole::index},
+            {"p10", target().unit(), ParameterRole::amplitude},
+            {"p01", target().unit(), ParameterRole::amplitude},
+            {"p11", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    const auto [low, high] = range();
+    const auto [other_low, other_high] =
+        std::minmax_element(other_->value[axis].begin(), other_->value[axis].end());
+    if (!(*other_high > *other_low)) return {};
+    const double size = target().typical_size();
+    return {{{low, high, *other_low, *other_high, size, size, size}}};
+  }
+
+ private:
+  std::string function() const override { return "straight line, times that of " + other_->name; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double x = position(variable().value[axis][visit], p[0], p[1]);
+    const double y = position(other_->value[axis][visit], p[2], p[3]);
+    return p[4] * x + p[5] * y + p[6] * x * y;
+  }
+
+  DriverPointer other_;
+};
+
+/// A pattern on the sphere that no component of the specific force makes.
+class HarmonicTimesHarmonic final : public DrivenTerm {
+ public:
+  HarmonicTimesHarmonic(DriverPointer angle, DriverPointer other, Target target)
+      : DrivenTerm(std::move(angle), target), other_(std::move(other)) {}
+
+  bool repeats() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"n", "", ParameterRole::index},
+            {"m", "", ParameterRole::index},
+            {"cc", target().unit(), ParameterRole::amplitude},
+            {"sc", target().unit(), ParameterRole::amplitude},
+            {"cs", target().unit(), ParameterRole::amplitude},
+            {"ss", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const double size = target().typical_size();
+    std::vector<Hypothesis> starts;
+    if (!other_->varies()) return starts;
+    for (int n = 1; n <= kHighest; ++n)
+      for (int m = 1; m <= kHighest; ++m)
+        starts.push_back(
+            {{static_cast<double>(n), static_cast<double>(m), size, size, size, size}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "harmonic, times a harmonic of " + other_->name; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double phase = p[0] * variable().value[axis][visit];
+    const double other = p[1] * other_->value[axis][visit];
+    return (p[2] * std::cos(other) + p[4] * std::sin(other)) * std::cos(phase) +
+           (p[3] * std::cos(other) + p[5] * std::sin(other)) * std::sin(phase);
+  }
+
+  DriverPointer other_;
+};
+
+}  // namespace
+
+std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
+                                                const Target& target) {
+  return std::make_unique<LineTimesHarmonic>(std::move(driver), std::move(angle), target);
+}
+std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
+                                            const Target& target) {
+  return std::make_unique<LineTimesLine>(std::move(driver), std::move(other), target);
+}
+std::unique_ptr<SmoothTerm> harmonic_times_harmonic(DriverPointer angle, DriverPointer other,
+                                                    const Target& target) {
+  return std::make_unique<HarmonicTimesHarmonic>(std::move(angle), std::move(other), target);
+}
+
+}  // namespace plumbline
