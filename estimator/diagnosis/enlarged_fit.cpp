@@ -20,7 +20,7 @@ bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, s
 // Time constants, widths and the like keep their sign, and sensitivities about their size: no
 // effect takes their place.
 bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
-  constexpr double kLargestChange = 1.5;  // as a ratio
+  constexpr double kLargestChange = 3;  // as a ratio
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const auto own = static_cast<Eigen::Index>(i);
     const double ratio = trial.twelve[i](own) / start.twelve[i](own);
@@ -63,13 +63,18 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& whitened_jacobian) {
   return inverse * inverse.transpose();
 }
 
-/// Whether effects take the place of a sensitivity: next to nothing is known of it beside them.
+/// Whether effects take the place of a sensitivity: next to nothing is known of it beside them. Of
+/// a response that is creep for the most part little is known at rest; that is no fault of a fit.
 bool leave_a_sensitivity_open(const EnlargedFit& fit) {
-  constexpr double kUncertain = 0.05, kByEffects = 10;
+  constexpr double kUncertain = 0.3, kByEffects = 10;
   const auto uncertainty = [](const Eigen::MatrixXd& covariance, std::size_t axis) {
     const auto own = static_cast<Eigen::Index>(4 * axis + axis);
     return std::sqrt(covariance(own, own));
   };
+  const auto& effects = fit.parameters.effects;
+  if (std::any_of(effects.begin(), effects.end(),
+                  [](const ActiveEffect& active) { return active.effect->remembers(); }))
+    return false;
   std::optional<Eigen::MatrixXd> alone;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double K_V_per_g = fit.parameters.twelve[i](static_cast<Eigen::Index>(i));

@@ -288,7 +288,7 @@ SetOutcome in_strong_slow_noise(const char* effect) {
 void expect_driver_and_error_of_the_oracle(const SetOutcome& outcome) {
   EXPECT_EQ(outcome.driver_right, 1) << outcome.found;
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
-  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh) << outcome.found;
 }
 
 // Not one of the edges can be told from the slow noise; all of them can.
