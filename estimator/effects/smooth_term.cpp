@@ -227,8 +227,10 @@ class TermList {
     if (angles_.size() == 2) add(harmonic_times_harmonic(angles_[0], angles_[1], kBias));
     std::vector<DriverPointer> followed = columns_;
     if (clock_) followed.push_back(clock_);
+    if (angles_.size() == 2) followed.push_back(angles_[1]);
     for (const DriverPointer& driver : followed)
       for (const DriverPointer& angle : angles_) {
+        if (driver == angle) continue;
         add(line_times_harmonic(driver, angle, kBias));
         add(line_times_harmonic(driver, angle, angle->angle ? kDelta : kH));
       }
