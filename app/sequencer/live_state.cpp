@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "app/sequencer/progress.h"
+
 namespace plumbline::app {
 
 namespace {
 
 constexpr std::chrono::milliseconds kSampleInterval{20};
-/// Before so much of the plan is done, its pace says nothing.
-constexpr double kPaceKnown = 0.01;
 
 double seconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double>(duration).count();

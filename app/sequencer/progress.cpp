@@ -10,8 +10,6 @@ namespace plumbline::app {
 namespace {
 
 constexpr std::chrono::milliseconds kRedraw{100};
-/// Before that the pace says nothing.
-constexpr double kPaceKnown = 0.01;
 
 double share(const Progress& progress) {
   return progress.planned_total_s > 0 ? progress.planned_done_s / progress.planned_total_s : 0;

@@ -9,6 +9,9 @@
 
 namespace plumbline::app {
 
+/// Share of the plan before which the pace says nothing.
+inline constexpr double kPaceKnown = 0.01;
+
 /// On a terminal one line that is written over several times a second; elsewhere a plain line for
 /// every tenth of the plan.
 class ProgressDisplay {

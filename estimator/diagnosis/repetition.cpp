@@ -93,7 +93,7 @@ bool has_edges(const SearchModel& model, std::size_t axis) {
 }
 bool put_train_in_place_of(SearchModel& model, const std::vector<std::size_t>& instances,
                            std::size_t axis) {
-  constexpr double kRefined = 1.3;  // by which a train may gain more when its edges move
+  constexpr double kMayGain = 1.3;  // by which a train may gain more when its edges move
   const SearchOptions& options = model.options();
   const double false_alarm =
       has_edges(model, axis) ? options.false_alarm_of_train_at_edges : options.false_alarm;
@@ -102,7 +102,7 @@ bool put_train_in_place_of(SearchModel& model, const std::vector<std::size_t>& i
   const auto comb = regular_steps(model.list(), model.responses(), without, axis);
   if (!comb) return false;
   const double looks = static_cast<double>(kAxisCount) * comb->looks;
-  if (p_of_search(log_chi_squared_tail(kRefined * comb->gain, 1), looks) > false_alarm)
+  if (p_of_search(log_chi_squared_tail(kMayGain * comb->gain, 1), looks) > false_alarm)
     return false;
   const double size = comb->size, up_s = comb->first_up_s;
   return replace_in_one(

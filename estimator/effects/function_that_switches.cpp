@@ -69,6 +69,7 @@ class Pulses final : public DrivenTerm {
     const double crest =
         longest[0] + period * std::atan2(longest[3], longest[2]) / (2 * std::numbers::pi);
     std::vector<Hypothesis> found;
+    found.reserve(kWidths.size());
     for (const double share : kWidths)
       found.push_back({{edge(), period, share * period, crest, target().typical_size()}});
     return found;
@@ -214,6 +215,7 @@ class SawTooth final : public DrivenTerm {
   void from_falls(const std::vector<std::vector<double>>& falls,
                   std::vector<Hypothesis>& found) const {
     std::vector<double> places;
+    places.reserve(falls.size());
     for (const auto& fall : falls) places.push_back(fall[1]);
     std::sort(places.begin(), places.end());
     for (std::size_t k = 1; k < places.size(); ++k)

@@ -96,9 +96,12 @@ class Sector final : public DrivenTerm {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    for (const double width_rad : {0.7, 1.2, 2.0})
-      for (double middle = low; middle < high; middle += 0.35 * width_rad)
-        starts.push_back({{middle, width_rad, target().typical_size()}});
+    for (const double width_rad : {0.7, 1.2, 2.0}) {
+      const double step_rad = 0.35 * width_rad;
+      const auto steps = static_cast<int>(std::ceil((high - low) / step_rad));
+      for (int k = 0; k < steps; ++k)
+        starts.push_back({{low + k * step_rad, width_rad, target().typical_size()}});
+    }
     return starts;
   }
   std::vector<Hypothesis> closer(const VisitLog&, std::size_t,

@@ -32,8 +32,9 @@ class BiasStep final : public Effect {
       if (!after && !before) continue;
       const Visit& visit = log.visits[k];
       for (std::size_t part = 1; part < effect::kPartsOfDwell; ++part) {
-        const auto sample = static_cast<double>(visit.count * part / effect::kPartsOfDwell);
-        within.push_back({{found.p[0], visit.t_arrival_s + visit.step_s * sample}});
+        const std::size_t sample = visit.count * part / effect::kPartsOfDwell;
+        const double into_s = visit.step_s * static_cast<double>(sample);
+        within.push_back({{found.p[0], visit.t_arrival_s + into_s}});
       }
     }
     return within;

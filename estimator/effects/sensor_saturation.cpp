@@ -18,7 +18,7 @@ class Saturation final : public Effect {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     std::vector<Hypothesis> starts;
     // Near the largest response few readings tell one limit from the next.
-    for (double L_g = 0.5; L_g < 0.96; L_g += 0.03) starts.push_back({{L_g}});
+    for (int step = 0; step < 16; ++step) starts.push_back({{0.5 + 0.03 * step}});
     for (const double L_g : {0.965, 0.98, 0.99}) starts.push_back({{L_g}});
     return starts;
   }

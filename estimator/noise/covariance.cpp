@@ -12,9 +12,8 @@ namespace {
 /// Spans over which flicker noise averages to the level that is meant by U₀.
 constexpr double kFlickerReach = 2;
 
-double duration_s(const SampleWindow& w) { return static_cast<double>(w.count) * w.step_s; }
 double begin_s(const SampleWindow& w) { return w.first_s - w.step_s; }
-double middle_s(const SampleWindow& w) { return begin_s(w) + 0.5 * duration_s(w); }
+double middle_s(const SampleWindow& w) { return begin_s(w) + 0.5 * w.duration_s(); }
 
 /// Second antiderivative of ln|x|.
 double log_twice_integrated(double x) {
@@ -23,8 +22,8 @@ double log_twice_integrated(double x) {
 
 /// ln|t − s| averaged over t and s in two windows.
 double mean_log_distance(const SampleWindow& a, const SampleWindow& b) {
-  const double wa = duration_s(a);
-  const double wb = duration_s(b);
+  const double wa = a.duration_s();
+  const double wb = b.duration_s();
   const double apart = std::abs(middle_s(b) - middle_s(a));
   // Far apart the closed form cancels; the series is then exact to 1e-9.
   if (apart > 100 * (wa + wb)) return std::log(apart) - (wa * wa + wb * wb) / (24 * apart * apart);
@@ -42,13 +41,13 @@ Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double de
   Eigen::VectorXd averaged(n);  // of exp(−decay·t) over the window
   Eigen::MatrixXd covariance(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double x = decay_per_s * duration_s(windows[static_cast<std::size_t>(i)]);
+    const double x = decay_per_s * windows[static_cast<std::size_t>(i)].duration_s();
     averaged(i) = x > 1e-6 ? -std::expm1(-x) / x : 1 - 0.5 * x;
     covariance(i, i) = x > 1e-3 ? variance * 2 * (1 - averaged(i)) / x : variance * (1 - x / 3);
   }
   for (Eigen::Index i = 0; i < n; ++i) {
     const SampleWindow& a = windows[static_cast<std::size_t>(i)];
-    const double end_s = begin_s(a) + duration_s(a);
+    const double end_s = begin_s(a) + a.duration_s();
     for (Eigen::Index j = i + 1; j < n; ++j) {
       const double apart_s = std::max(begin_s(windows[static_cast<std::size_t>(j)]) - end_s, 0.0);
       covariance(i, j) = variance * averaged(i) * averaged(j) * std::exp(-decay_per_s * apart_s);
@@ -90,7 +89,7 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
   unit.fill(Eigen::MatrixXd::Zero(n, n));
   if (n == 0) return unit;
   const double origin = begin_s(windows.front());
-  const double span = begin_s(windows.back()) + duration_s(windows.back()) - origin;
+  const double span = begin_s(windows.back()) + windows.back().duration_s() - origin;
   const double log_reach = std::log(kFlickerReach * span);
   Eigen::VectorXd time(n);
   for (Eigen::Index i = 0; i < n; ++i)
@@ -99,7 +98,7 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
   for (Eigen::Index i = 0; i < n; ++i) {
     const SampleWindow& a = windows[static_cast<std::size_t>(i)];
     assert(a.count > 0 && a.step_s > 0);
-    const double width = duration_s(a);
+    const double width = a.duration_s();
     // The increments of quantization cancel within a window but for the two ends.
     unit[kTermQ](i, i) = 2 / (width * width);
     unit[kTermN](i, i) = 1 / width;
@@ -120,7 +119,7 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
       const SampleWindow& b = windows[static_cast<std::size_t>(i + 1)];
       const bool touching = begin_s(b) - (begin_s(a) + width) < 0.5 * a.step_s;
       if (touching) {
-        unit[kTermQ](i, i + 1) = -1 / (width * duration_s(b));
+        unit[kTermQ](i, i + 1) = -1 / (width * b.duration_s());
         unit[kTermQ](i + 1, i) = unit[kTermQ](i, i + 1);
       }
     }

@@ -15,6 +15,7 @@ struct SampleWindow {
   double first_s = 0;
   double step_s = 0;
   std::size_t count = 0;
+  double duration_s() const { return step_s * static_cast<double>(count); }
 };
 
 /// The windows of the poses: first sample, median spacing, number. A pose of a single sample gets

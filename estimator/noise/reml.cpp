@@ -27,10 +27,6 @@ bool has_diagonal_only(const Eigen::MatrixXd& covariance) {
   return true;
 }
 
-double duration_s(const SampleWindow& window) {
-  return window.step_s * static_cast<double>(window.count);
-}
-
 /// The same process with its course over the run counted from its mean, and the variance of that
 /// mean added to all entries alike. Differences between windows are what they were, and so is all
 /// that is estimated beside a free zero; but the zero becomes the level of the whole run instead of
@@ -55,10 +51,10 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
                                            : about_mean_of_run(terms[term]));
   if (windows.empty()) return processes;
   const double span_s =
-      windows.back().first_s + duration_s(windows.back()) - windows.front().first_s;
+      windows.back().first_s + windows.back().duration_s() - windows.front().first_s;
   std::vector<double> dwell_s;
   dwell_s.reserve(windows.size());
-  for (const SampleWindow& window : windows) dwell_s.push_back(duration_s(window));
+  for (const SampleWindow& window : windows) dwell_s.push_back(window.duration_s());
   std::nth_element(dwell_s.begin(), dwell_s.begin() + std::ssize(dwell_s) / 2, dwell_s.end());
   const double shortest_s = 0.5 * dwell_s[dwell_s.size() / 2];
   double tau_s = 0.7 * span_s;

@@ -54,10 +54,10 @@ std::string ref_type(const xmlNode* node) {
   return copy;
 }
 
-using Visit = std::function<void(const xmlNode*)>;
+using ElementVisitor = std::function<void(const xmlNode*)>;
 
 /// Elements of this name below a node, not below one another.
-void each(const xmlNode* node, const std::string& name, const Visit& visit) {
+void each(const xmlNode* node, const std::string& name, const ElementVisitor& visit) {
   for (const xmlNode* c = node->children; c != nullptr; c = c->next) {
     if (c->type == XML_ELEMENT_NODE && view(c->name) == name) {
       visit(c);

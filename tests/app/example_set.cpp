@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
+
+#include "tests/app/temp_folder.h"
 
 namespace plumbline::app {
 
@@ -63,6 +66,12 @@ void ExampleSet::write(const std::filesystem::path& folder) const {
     record << fmt::format("{:.4f},{}\n", 0.01 * i, outputs(0, 0));
   }
   std::ofstream(folder / "run.toml") << example_run_toml();
+}
+
+std::string without_provenance(const std::filesystem::path& file) {
+  auto json = nlohmann::ordered_json::parse(text_of(file));
+  json.erase("provenance");
+  return json.dump();
 }
 
 }  // namespace plumbline::app

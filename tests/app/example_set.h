@@ -31,4 +31,7 @@ struct ExampleSet {
 /// The run.toml that belongs to it.
 std::string example_run_toml();
 
+/// A result.json less what differs from run to run.
+std::string without_provenance(const std::filesystem::path& file);
+
 }  // namespace plumbline::app

@@ -36,12 +36,6 @@ std::vector<std::string> calibrate_arguments(const fs::path& folder, const fs::p
 }
 
 /// result.json without what may differ between two runs.
-std::string without_provenance(const fs::path& file) {
-  auto json = nlohmann::ordered_json::parse(text_of(file));
-  json.erase("provenance");
-  return json.dump();
-}
-
 TEST(Program, HelpAndVersionAreNoErrors) {
   const auto version = run_plumbline({"--version"});
   EXPECT_EQ(version.exit_code, 0);

@@ -12,7 +12,7 @@ const std::string kRig =
     "[head]\nmodbus = \"tcp:127.0.0.1:502\"\n[sensor]\ncan = \"can:can0\"\n"
     "bits = 12\nmin_V = -2.5\nmax_V = 2.5\n";
 
-std::string message_of(const std::string& text) {
+std::string refusal_of(const std::string& text) {
   const auto description = parse_rig_description(text, "rig.toml");
   return description ? "" : description.error().message;
 }
@@ -55,17 +55,17 @@ TEST(RigDescription, ServesAsADescriptionOfTheRun) {
 }
 
 TEST(RigDescription, RefusesContradictions) {
-  EXPECT_EQ(message_of(kRun + kRig + "[adc]\nbits = 16\nmin_V = -2.5\nmax_V = 2.5\n"),
+  EXPECT_EQ(refusal_of(kRun + kRig + "[adc]\nbits = 16\nmin_V = -2.5\nmax_V = 2.5\n"),
             "rig.toml:12:1: adc: contradicts the converter of [sensor]; give it once");
-  EXPECT_EQ(message_of(kRun + kRig + "[settling]\nhold_s = 3\ncap_s = 2\n"),
+  EXPECT_EQ(refusal_of(kRun + kRig + "[settling]\nhold_s = 3\ncap_s = 2\n"),
             "rig.toml:14:9: settling.cap_s: 2 is shorter than hold_s = 3");
   EXPECT_EQ(
-      message_of(kRun + kRig + "[plan]\norder = \"sneak\"\n"),
+      refusal_of(kRun + kRig + "[plan]\norder = \"sneak\"\n"),
       "rig.toml:13:9: plan.order = \"sneak\" is not one of raster, snake, spiral, random; did "
       "you mean \"snake\"?");
-  EXPECT_EQ(message_of(kRun + kRig + "[plan]\nsample_per_pose = 3\n"),
+  EXPECT_EQ(refusal_of(kRun + kRig + "[plan]\nsample_per_pose = 3\n"),
             "rig.toml:13:1: unknown key plan.sample_per_pose; did you mean samples_per_pose?");
-  EXPECT_EQ(message_of(kRun + kRig + "[plan]\nsamples_per_pose = 0\n"),
+  EXPECT_EQ(refusal_of(kRun + kRig + "[plan]\nsamples_per_pose = 0\n"),
             "rig.toml:13:20: plan.samples_per_pose = 0 is out of range (1 … 1000000)");
 }
 

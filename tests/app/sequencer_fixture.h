@@ -10,9 +10,7 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <memory>
 #include <regex>
 #include <string>
@@ -23,6 +21,7 @@
 #include "app/config/rig_description.h"
 #include "app/sequencer/session.h"
 #include "app/sequencer/simulated_rig.h"
+#include "tests/app/temp_folder.h"
 
 namespace plumbline::app {
 
@@ -34,11 +33,6 @@ constexpr double kSpeed = 20;  // what the simulator keeps up with when it is in
 #else
 constexpr double kSpeed = 100;
 #endif
-
-inline std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 inline const fs::path kWorlds = fs::path(PLUMBLINE_SOURCE_DIR) / "rig/sim/worlds";
 

@@ -10,7 +10,7 @@
 namespace plumbline::app {
 namespace {
 
-constexpr double kRate_Hz = 100;
+constexpr double kSampleRate_Hz = 100;
 const Adc kAdc{16, -5.0, 0.0};  // a step of 76.3 µV
 constexpr double kNoise_V = 0.0005;
 
@@ -22,7 +22,7 @@ std::vector<RawSample> record(std::size_t count, const std::function<double(doub
   std::vector<RawSample> samples(count);
   for (std::size_t i = 0; i < count; ++i) {
     samples[i].counter = static_cast<std::int64_t>(i);
-    samples[i].t_s = static_cast<double>(i) / kRate_Hz;
+    samples[i].t_s = static_cast<double>(i) / kSampleRate_Hz;
     for (auto& code : samples[i].code) {
       const double volts = signal_V(samples[i].t_s) + noise_V * noise(random);
       code = static_cast<std::int32_t>(std::lround((volts - kAdc.volts(0)) / kAdc.lsb_V()));
@@ -33,11 +33,11 @@ std::vector<RawSample> record(std::size_t count, const std::function<double(doub
 
 double at_rest(double /*t_s*/) { return -2.5; }
 
-NoiseFloor floor_of(double sd_V) { return white_noise_floor(sd_V, kAdc, 20, kRate_Hz); }
+NoiseFloor floor_of(double sd_V) { return white_noise_floor(sd_V, kAdc, 20, kSampleRate_Hz); }
 
 /// Time of the first sample at which the detector is satisfied, negative when it never is.
 double settled_s(const std::vector<RawSample>& samples, std::optional<NoiseFloor> floor) {
-  SettlingDetector detector(SettlingOptions{}, kAdc, kRate_Hz, floor);
+  SettlingDetector detector(SettlingOptions{}, kAdc, kSampleRate_Hz, floor);
   for (const RawSample& sample : samples)
     if (detector.add(sample)) return sample.t_s;
   return -1;
@@ -45,20 +45,20 @@ double settled_s(const std::vector<RawSample>& samples, std::optional<NoiseFloor
 
 // n = 20: sqrt(12 / (20·399)) = 0.038778 steps of 1/100 s, so 3.8778 V/s for 1 V.
 TEST(NoiseFloor, WhiteNoiseBySlopeFormula) {
-  const NoiseFloor floor = white_noise_floor(0.001, kAdc, 20, kRate_Hz);
+  const NoiseFloor floor = white_noise_floor(0.001, kAdc, 20, kSampleRate_Hz);
   EXPECT_DOUBLE_EQ(floor.sd_V[0], 0.001);
   EXPECT_NEAR(floor.slope_sd_V_s[2], 0.0038778, 1e-6);
 }
 
 TEST(NoiseFloor, NeverBelowHalfAStepOfTheConverter) {
-  EXPECT_NEAR(white_noise_floor(0, kAdc, 20, kRate_Hz).sd_V[1], 38.15e-6, 0.01e-6);
+  EXPECT_NEAR(white_noise_floor(0, kAdc, 20, kSampleRate_Hz).sd_V[1], 38.15e-6, 0.01e-6);
 }
 
 TEST(NoiseFloor, IsLearntFromARecordAtRest) {
   auto soak = record(20000, at_rest);
   for (std::size_t i = 0; i < 2000; ++i)
     soak[i].code[0] += static_cast<int>(i % 7) * 100;  // a knock
-  const auto floor = learn_noise_floor(soak, kAdc, 20, kRate_Hz);
+  const auto floor = learn_noise_floor(soak, kAdc, 20, kSampleRate_Hz);
   ASSERT_TRUE(floor.has_value());
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     EXPECT_NEAR(floor->sd_V[axis], kNoise_V, 0.05 * kNoise_V);
@@ -69,10 +69,10 @@ TEST(NoiseFloor, IsLearntFromARecordAtRest) {
 }
 
 TEST(NoiseFloor, IsUnknownWithoutAWholeWindow) {
-  EXPECT_FALSE(learn_noise_floor(record(19, at_rest), kAdc, 20, kRate_Hz).has_value());
+  EXPECT_FALSE(learn_noise_floor(record(19, at_rest), kAdc, 20, kSampleRate_Hz).has_value());
   auto broken = record(20, at_rest);
   for (std::size_t i = 10; i < broken.size(); ++i) broken[i].counter += 5;
-  EXPECT_FALSE(learn_noise_floor(broken, kAdc, 20, kRate_Hz).has_value());
+  EXPECT_FALSE(learn_noise_floor(broken, kAdc, 20, kSampleRate_Hz).has_value());
 }
 
 TEST(Settling, AQuietOutputTakesOneWindow) {

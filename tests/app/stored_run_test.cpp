@@ -84,12 +84,6 @@ class StoredRun {
   double t_s_ = 0;
 };
 
-std::string without_provenance(const fs::path& file) {
-  auto json = nlohmann::ordered_json::parse(text_of(file));
-  json.erase("provenance");
-  return json.dump();
-}
-
 TEST(StoredRunCalibration, EqualsThatOfItsFilesAndEvaluatesTheFreshPoses) {
   const TempFolder folder;
   const StoredRun run(folder / "runs.db");

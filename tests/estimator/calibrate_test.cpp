@@ -16,7 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 
-const Adc kSixteenBits{16, -5.0, 0.0};
 const Adc kTwelveBits{12, -5.0, 0.0};
 
 Calibration calibrated(const SyntheticRun& data) {
@@ -280,7 +279,7 @@ TEST(Coverage, TwelveBitsWithNoiseOfHalfAStep) {
 }
 
 TEST(Calibrate, StaticRecordWithGapsIsUsedUpToThem) {
-  SyntheticRun data = synthetic_run(8, {16, -5.0, 0.0});
+  SyntheticRun data = synthetic_run(8, kSixteenBits);
   const Calibration whole = calibrate({data.run, &data.still, data.description}, {});
   // 10 s and 40 s of record, 600 s between them; meanwhile the level has moved.
   for (std::size_t i = 1000; i < data.still.size(); ++i) {

@@ -12,10 +12,10 @@
 #include "estimator/effects/visit_log.h"
 #include "estimator/pose_means.h"
 
+#include "tests/estimator/synthetic_run.h"
+
 namespace plumbline {
 namespace {
-
-constexpr Adc kSixteenBits{16, -5, 0};
 
 // Every code of a stretch, as a slowly swept input gives them.
 std::vector<std::int64_t> sweep(double (*reading)(double u_V, double lsb_V)) {

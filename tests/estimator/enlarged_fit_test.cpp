@@ -15,7 +15,7 @@ namespace {
 // Two waves of the x axis in the time, of so many cycles in the run each, fitted with their periods
 // held to readings that hold the sum of two waves of 3 and of 5 cycles.
 EnlargedFit fit_of_two_waves(double cycles, double other_cycles) {
-  SyntheticRun data = synthetic_run(3, {16, -5.0, 0.0});
+  SyntheticRun data = synthetic_run(3, kSixteenBits);
   const VisitLog log = make_visit_log(data.run, data.description);
   Observations observed = observe(data.run, log);
   std::shared_ptr<const Driver> clock;

@@ -23,8 +23,6 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const Adc kSixteenBits{16, -5.0, 0.0};
-
 Calibration calibrated(const SyntheticRun& data, const CalibrationOptions& options = {}) {
   return calibrate({data.run, &data.still, data.description}, options);
 }

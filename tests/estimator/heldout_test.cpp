@@ -24,7 +24,7 @@ Eigen::MatrixXd slow_covariance_V2(Eigen::Index n) {
 }
 
 TEST(Heldout, IsWhatARefitLeavesAndTheOtherReadingsDoNotForetell) {
-  const SyntheticRun data = synthetic_run(3, {16, -5.0, 0.0}, {.k2_x_V_per_g2 = 1e-3});
+  const SyntheticRun data = synthetic_run(3, kSixteenBits, {.k2_x_V_per_g2 = 1e-3});
   const VisitLog log = make_visit_log(data.run, data.description);
   const Observations observed = observe(data.run, log);
   const Eigen::Index n = observed.mean_V[0].size();

@@ -14,8 +14,6 @@ namespace {
 
 using testing::IsEmpty;
 
-const Adc kFineConverter{16, -5.0, 0.0};
-
 SyntheticOptions fine_grid() {
   SyntheticOptions options;
   options.delta_step_deg = 10;
@@ -46,7 +44,7 @@ void expect_noise_of_x(const Calibration& result, const char* driver, const char
 TEST(NoiseDrivers, NoiseThatGrowsWithWhatTheAxisFeels) {
   SyntheticOptions options = fine_grid();
   options.noise_x = [](const auto& a_g, double) { return std::exp(0.7 * std::abs(a_g[0])); };
-  const SyntheticRun data = synthetic_run(3, kFineConverter, options);
+  const SyntheticRun data = synthetic_run(3, kSixteenBits, options);
   const Calibration result = calibration_of(data);
   expect_noise_of_x(result, "a_x", "noise, straight line in its size", std::exp(0.7));
   // It is in no mean, so another set lacks nothing of the model.
@@ -56,7 +54,7 @@ TEST(NoiseDrivers, NoiseThatGrowsWithWhatTheAxisFeels) {
 TEST(NoiseDrivers, NoiseThatEveryArrivalBringsAlong) {
   SyntheticOptions options = fine_grid();
   options.noise_x = [](const auto&, double since_s) { return since_s < 0.05 ? 2 : 1; };
-  expect_noise_of_x(calibration_of(synthetic_run(4, kFineConverter, options)), "t_in_pose",
+  expect_noise_of_x(calibration_of(synthetic_run(4, kSixteenBits, options)), "t_in_pose",
                     "noise, first quarter against the rest", 2);
 }
 
@@ -66,7 +64,7 @@ TEST(NoiseDrivers, QuietPosesCountForMore) {
   options.noise_x = [](const auto& a_g, double) { return std::exp(3 * std::abs(a_g[0])); };
   double square = 0, expected = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-    const SyntheticRun data = synthetic_run(seed, kFineConverter, options);
+    const SyntheticRun data = synthetic_run(seed, kSixteenBits, options);
     const AxisEstimate x = calibration_of(data).estimates.batch_ls[0];
     for (Eigen::Index k = 0; k < 4; ++k) {
       square +=
@@ -80,7 +78,7 @@ TEST(NoiseDrivers, QuietPosesCountForMore) {
 
 TEST(NoiseDrivers, NoiseThatFollowsNothingHasNoDriver) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const Calibration result = calibration_of(synthetic_run(seed, kFineConverter));
+    const Calibration result = calibration_of(synthetic_run(seed, kSixteenBits));
     EXPECT_THAT(result.diagnosis.unlisted, IsEmpty()) << seed << result.diagnosis.reason;
   }
 }
@@ -96,7 +94,7 @@ TEST(NoiseDrivers, ABiasThatWandersAsTheRecordNeverDidIsSaid) {
     level_V = std::normal_distribution<double>(0, kSize_V)(random);
     return level_V;
   };
-  const Calibration result = calibration_of(synthetic_run(6, kFineConverter, options));
+  const Calibration result = calibration_of(synthetic_run(6, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_EQ(result.diagnosis.verdict, Verdict::partly_explained);
   ASSERT_FALSE(result.diagnosis.unlisted.empty());
@@ -113,14 +111,14 @@ TEST(NoiseDrivers, ALimitExplainsItsQuietReadings) {
   constexpr std::uint64_t kSeed = 5;
   constexpr double kLimit_g = 0.7;
   SyntheticOptions options = fine_grid();
-  const auto x = synthetic_run(kSeed, kFineConverter, options).truth[0];
+  const auto x = synthetic_run(kSeed, kSixteenBits, options).truth[0];
   const auto clipped_g = [=](const auto& a_g) {
     const double response_g = (x[0] * a_g[0] + x[1] * a_g[1] + x[2] * a_g[2]) / x[0];
     return std::clamp(response_g, -kLimit_g, kLimit_g) - response_g;
   };
   options.more_x_V = [x, clipped_g](const auto& a_g, double) { return x[0] * clipped_g(a_g); };
   options.noise_x = [clipped_g](const auto& a_g, double) { return clipped_g(a_g) == 0 ? 1 : 0.2; };
-  const Calibration result = calibration_of(synthetic_run(kSeed, kFineConverter, options));
+  const Calibration result = calibration_of(synthetic_run(kSeed, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);
   ASSERT_EQ(result.diagnosis.effects.size(), 1U);
   EXPECT_EQ(result.diagnosis.effects[0].id, "sensor.saturation");

@@ -316,7 +316,7 @@ TEST(Calibrate, UsesTheCodesWhereStepsAreCoarseAndSaysSo) {
 }
 
 TEST(Uncertainty, MonteCarloAgreesWithTheLawOfPropagation) {
-  SyntheticRun data = synthetic_run(4, {16, -5.0, 0.0});
+  SyntheticRun data = synthetic_run(4, kSixteenBits);
   data.description.angles = {20, 20};
   const Calibration result = calibrate({data.run, &data.still, data.description}, {});
   ASSERT_TRUE(result.uncertainty);
@@ -343,7 +343,7 @@ TEST(Uncertainty, MonteCarloAgreesWithTheLawOfPropagation) {
 
 TEST(Uncertainty, SaysWhenTheLawOfPropagationFails) {
   // Three degrees of positioning uncertainty: cosines are no longer straight.
-  const SyntheticRun data = synthetic_run(5, {16, -5.0, 0.0});
+  const SyntheticRun data = synthetic_run(5, kSixteenBits);
   RunDescription description = data.description;
   description.angles = {10800, 10800};
   PerAxis<PropagationAxis> axes;

@@ -21,7 +21,7 @@ struct Structure {
 
 UnlistedStructure expect_only_structure(const SyntheticOptions& options,
                                         const Structure& expected) {
-  const SyntheticRun data = synthetic_run(7, {16, -5.0, 0.0}, options);
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
   const Calibration result = calibrate({data.run, &data.still, data.description}, {});
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_THAT(result.diagnosis.effects, IsEmpty());

@@ -7,10 +7,11 @@
 #include <cmath>
 #include <random>
 
+#include "tests/estimator/synthetic_run.h"
+
 namespace plumbline {
 namespace {
 
-constexpr Adc kSixteenBits{16, -5, 0};
 constexpr std::size_t kReadings = 40;
 
 struct Dwells {

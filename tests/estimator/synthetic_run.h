@@ -13,6 +13,9 @@
 
 namespace plumbline {
 
+/// A converter whose steps are fine against the noise.
+constexpr Adc kSixteenBits{16, -5.0, 0.0};
+
 struct SyntheticOptions {
   double sigma_V = 3e-4;  ///< of one sample
   std::size_t samples_per_pose = 20;

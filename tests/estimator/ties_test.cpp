@@ -16,8 +16,6 @@ using testing::Field;
 using testing::IsEmpty;
 using testing::IsSupersetOf;
 
-const Adc kConverter{16, -5.0, 0.0};
-
 constexpr double kHalfWidth_V = 3e-4;
 
 /// In random order, x off by ±kHalfWidth_V after its force rose or fell. Where it came back to what
@@ -39,7 +37,7 @@ SyntheticRun with_hysteresis(AtTie at_tie) {
     last_s = t_s;
     return kHalfWidth_V * sign;
   };
-  return synthetic_run(3, kConverter, options);
+  return synthetic_run(3, kSixteenBits, options);
 }
 
 void expect_hysteresis_alone(const SyntheticRun& data) {
@@ -70,8 +68,8 @@ TEST(Hysteresis, IsLeftOpenWhereTheForceComesBackAndNobodyKnows) {
 // alone, on which nothing had risen yet. So would a step between the codes of two rings, or in
 // time.
 TEST(Hysteresis, OfAForceThatNeverFallsShowsInTheFirstRing) {
-  SyntheticRun data = synthetic_run(3, kConverter);
-  const double half_width_V = 6 * kConverter.lsb_V();
+  SyntheticRun data = synthetic_run(3, kSixteenBits);
+  const double half_width_V = 6 * kSixteenBits.lsb_V();
   for (const Pose& pose : data.run.poses)
     for (std::size_t k = 0; k < pose.count; ++k)
       if (pose.h_deg > 0) data.run.samples.u_V[2][pose.first + k] += half_width_V;
@@ -103,7 +101,7 @@ TEST(Settling, KnowsThatTheHeadMayComeFromItsZero) {
     last_s = t_s;
     return kSettling_V_per_g * (from_g - now_g) * std::exp(-(t_s - arrival_s) / kTau_s);
   };
-  const SyntheticRun data = synthetic_run(3, kConverter, options);
+  const SyntheticRun data = synthetic_run(3, kSixteenBits, options);
   const Calibration result = calibrate({data.run, &data.still, data.description}, {});
   ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.settling")));
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());

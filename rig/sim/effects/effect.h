@@ -33,13 +33,13 @@ struct Moment {
   double delta_speed_deg_s = 0;
   double h_speed_deg_s = 0;
   bool moving = false;
-  int approach = 0;        ///< direction of the last δ motion: −1, +1, 0 before the first
-  long long pose = 0;      ///< counts the arrivals at rest; 0 is where the head stands first
-  double t_in_pose_s = 0;  ///< since the arrival
+  int approach = 0;           ///< direction of the last δ motion: −1, +1, 0 before the first
+  long long pose = 0;         ///< counts the arrivals at rest; 0 is where the head stands first
+  double t_in_pose_s = 0;     ///< since the arrival
   PerAxis<double> a_nominal;  ///< nominal specific force at the angles above, g
 
-  Attitude attitude;  ///< with all head errors; filled in after bend_head()
-  PerAxis<double> a;  ///< true specific force in the sensor frame, g; likewise
+  Attitude attitude;           ///< with all head errors; filled in after bend_head()
+  PerAxis<double> a;           ///< true specific force in the sensor frame, g; likewise
   PerAxis<double> a_previous;  ///< the same when the head left the previous pose; first pose: a
 
   double air_C = 0;   ///< of the room
