@@ -186,6 +186,12 @@ bool SearchModel::adopt(const EnlargedParameters& parameters) {
     if (same_on_axis(parameters, stage_.fit.parameters, axis))
       before.known[axis] = &stage_.noise[axis];
   Stage next = settle(input_, parameters, before);
+  if (!next.fit.determined && !parameters.effects.empty()) {
+    // Against less noise a shape may go on to where it changes nothing any more.
+    EnlargedParameters held = parameters;
+    held.effects.back() = with_shapes_held(std::move(held.effects.back()));
+    next = settle(input_, held, before);
+  }
   if (!next.fit.determined) return false;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (before.known[axis] != nullptr) next.crossing_V2[axis] = std::move(stage_.crossing_V2[axis]);

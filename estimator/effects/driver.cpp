@@ -40,6 +40,12 @@ PerAxis<std::vector<double>> changes_g(const VisitLog& log) {
   return change_g;
 }
 
+/// δ's, the shorter way round.
+double turn_rad(const VisitLog& log, std::size_t visit) {
+  return std::remainder(log.visits[visit].delta_rad - log.before(visit)->delta_rad,
+                        2 * std::numbers::pi);
+}
+
 // Slope between the neighbours of a visit, per hour.
 std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& value) {
   std::vector<double> rate(value.size());
@@ -144,9 +150,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
     way.past = std::move(past);
     way.span = about_zero(way.value);
   };
-  add_way("turn of delta since", [&](std::size_t k) {
-    return std::remainder(visits[k].delta_rad - log.before(k)->delta_rad, 2 * std::numbers::pi);
-  });
+  add_way("turn of delta since", [&](std::size_t k) { return turn_rad(log, k); });
   add_way("change of h since",
           [&](std::size_t k) { return visits[k].h_rad - log.before(k)->h_rad; });
   for (const Column& column : recorded_columns(log)) {
@@ -173,10 +177,40 @@ std::vector<Driver> changes_of_others(const VisitLog& log) {
   return drivers;
 }
 
+std::vector<Driver> sizes_of_changes(const VisitLog& log) {
+  PerAxis<std::vector<double>> size_g = changes_g(log);
+  for (std::vector<double>& of_axis : size_g)
+    for (double& value : of_axis) value = std::abs(value);
+  const auto size_rad = for_all_axes(log, [&](std::size_t k) {
+    return log.before(k) == nullptr ? 0.0 : std::abs(turn_rad(log, k));
+  });
+  std::vector<Driver> drivers = {
+      {"previous_pose", "size of the change of a_i since", std::move(size_g)},
+      {"previous_pose", "size of the turn of delta since", size_rad}};
+  for (Driver& driver : drivers) driver.span = about_zero(driver.value);
+  return drivers;
+}
+
 Driver load(const VisitLog& log) {
   Driver driver{"previous_pose", "", {}};
+  if (log.moved_since) driver.begins_anew = log.earlier;
   for (std::size_t i = 0; i < kAxisCount; ++i) driver.value[i] = specific_force_component_g(log, i);
   return driver;
+}
+
+std::vector<Driver> loads_of_others(const VisitLog& log) {
+  const Driver own = load(log);
+  std::vector<Driver> drivers;
+  for (std::size_t other = 1; other < kAxisCount; ++other) {
+    Driver& driver = drivers.emplace_back(
+        Driver{"previous_pose",
+               other == 1 ? "component of the next axis" : "component of the axis after the next",
+               {}});
+    driver.begins_anew = own.begins_anew;
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      driver.value[i] = own.value[(i + other) % kAxisCount];
+  }
+  return drivers;
 }
 
 }  // namespace plumbline

@@ -27,9 +27,12 @@ struct Driver {
   /// explain themselves prove nothing.
   std::optional<std::size_t> output_of = {};
   double scatter = 0;  ///< of single readings about the value that stands for a dwell
+  /// The visit to which the head came from where nothing recorded says; 0 where that is the first.
+  std::size_t begins_anew = 0;
   bool varies() const;
   /// How many different values it took on any axis at least.
   std::size_t fewest_values() const;
+  bool way_begins(std::size_t visit) const { return visit == 0 || visit == begins_anew; }
   bool is_clock() const { return name == "t_s"; }
   bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column
 };
@@ -43,7 +46,14 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 /// the previous pose, under the name of what came before.
 std::vector<Driver> changes_of_others(const VisitLog& log);
 
+/// How far the component of the own axis and δ went on the way from the previous pose, whichever
+/// way, under the name of what came before.
+std::vector<Driver> sizes_of_changes(const VisitLog& log);
+
 /// The specific force of the own axis, under the name of what came before: for what follows it.
 Driver load(const VisitLog& log);
+
+/// The same of the next axis and of the one after that.
+std::vector<Driver> loads_of_others(const VisitLog& log);
 
 }  // namespace plumbline

@@ -84,6 +84,8 @@ std::unique_ptr<SmoothTerm> power(DriverPointer driver, const Target& target);
 std::unique_ptr<SmoothTerm> logarithm(DriverPointer driver, const Target& target);
 /// What follows the driver through a play of unknown width lags behind it by this function.
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
+/// What the driver draws along against friction: from −1 to 1, over an unknown reach.
+std::unique_ptr<SmoothTerm> friction(DriverPointer driver, const Target& target);
 
 /// A harmonic of an angle, with amplitude and phase in a straight line of the driver.
 std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,

@@ -242,49 +242,6 @@ class Step final : public DrivenTerm {
   StepEdge edge_;
 };
 
-class PlayLag final : public DrivenTerm {
- public:
-  using DrivenTerm::DrivenTerm;
-
-  bool remembers() const override { return true; }
-  bool guesses_at_start() const override { return true; }
-  std::vector<ParameterInfo> parameters() const override {
-    return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
-  }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
-    const auto [low, high] = range();
-    std::vector<Hypothesis> starts;
-    for (const double share : effect::geometric(0.01, 0.64, 7))
-      if (goes_to_and_fro(axis, share * (high - low)))
-        starts.push_back({{share * (high - low), target().typical_size()}});
-    return starts;
-  }
-
- private:
-  std::string function() const override { return "lag behind a play"; }
-  /// Drawn along in one direction only, the lag is a function of the driver itself.
-  bool goes_to_and_fro(std::size_t axis, double width) const {
-    const std::vector<double>& driver = variable().value[axis];
-    const double half = 0.5 * width;
-    bool up = false, down = false;
-    double follower = driver.front();
-    for (const double value : driver) {
-      up |= value - half > follower;
-      down |= value + half < follower;
-      follower = std::clamp(follower, value - half, value + half);
-    }
-    return up && down;
-  }
-  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
-    const std::vector<double>& driver = variable().value[axis];
-    const double half = 0.5 * std::abs(p[0]);
-    double follower = driver.front();
-    for (std::size_t k = 0; k <= visit; ++k)
-      follower = std::clamp(follower, driver[k] - half, driver[k] + half);
-    return p[1] * (follower - driver[visit]);
-  }
-};
-
 }  // namespace
 
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target) {
@@ -298,9 +255,6 @@ std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
 }
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge) {
   return std::make_unique<Step>(std::move(driver), target, edge);
-}
-std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
-  return std::make_unique<PlayLag>(std::move(driver), target);
 }
 
 }  // namespace plumbline

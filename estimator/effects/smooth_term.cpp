@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -75,13 +76,23 @@ class TermList {
       if (any_ || driver->varies()) add_of(driver);
     }
     add_of_two();
-    for (Driver& each : changes_of_others(log_)) {
+    for (Driver& each : loads_of_others(log_)) {
+      const auto driver = std::make_shared<const Driver>(std::move(each));
+      if (any_ || driver->varies()) add(friction(driver, kBias));
+    }
+    std::vector<Driver> changes = changes_of_others(log_);
+    std::ranges::move(sizes_of_changes(log_), std::back_inserter(changes));
+    for (Driver& each : changes) {
       const auto driver = std::make_shared<const Driver>(std::move(each));
       if (any_ || driver->varies()) add_polynomials(driver, kBias, {1});
     }
     add_of_wound_up_spindle();
     const auto attitude = std::make_shared<const Driver>(load(log_));
-    if (any_ || attitude->varies()) add(play(attitude, kBias));
+    if (any_ || attitude->varies()) {
+      add(play(attitude, kBias));
+      add(friction(attitude, kBias));
+      add(friction(attitude, {.form = TermForm::scale, .second = 0}));
+    }
     const double longest_s =
         any_ ? std::numeric_limits<double>::infinity() : log_.last_s() - log_.first_s();
     for (auto& term : memory_terms(log_, longest_s, attitude, columns_)) add(std::move(term));

@@ -12,6 +12,7 @@
 #include "app/certificate/table_columns.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/effects/catalogue.h"
+#include "estimator/effects/smooth_term.h"
 #include "tests/app/certificate_example.h"
 
 namespace plumbline::app {
@@ -285,6 +286,22 @@ TEST(Certificate, UkrainianForWhatTheCoreSays) {
                       "rig.backlash by 7.1 standard deviations"),
             "подальші положення у випадковому порядку (кількість 3, h від 10° до 40°) відрізнять "
             "його від rig.backlash на 7.1 стандартних відхилень");
+}
+
+TEST(Certificate, UkrainianForEveryShapeWithoutAName) {
+  const Visit visit{.step_s = 0.01, .count = 40, .covariate = {45, 5}};
+  const VisitLog log = log_of({.has_temperature = true,
+                               .covariate_names = {"rh_pct", "supply_V"},
+                               .visits = {visit, visit, visit}});
+  const Translator uk(Language::uk);
+  const std::regex variable("delta_deg|h_deg|temp_C|rh_pct|supply_V|a_i"), english("[a-z]{2,}");
+  const auto terms = smooth_terms(log, SmoothTermSelection::any);
+  ASSERT_GT(terms.size(), 300U);
+  for (const auto& term : terms) {
+    const std::string translated = uk.phrase(term->shape());
+    EXPECT_FALSE(std::regex_search(std::regex_replace(translated, variable, ""), english))
+        << term->shape() << ": " << translated;
+  }
 }
 
 TEST(Certificate, UkrainianForACalibrationWithoutAngles) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 
 #include "estimator/calibrate.h"
 #include "tests/estimator/synthetic_run.h"
@@ -11,6 +12,8 @@ namespace plumbline {
 namespace {
 
 using testing::Contains;
+using testing::ElementsAre;
+using testing::Field;
 using testing::IsEmpty;
 
 struct Structure {
@@ -279,6 +282,80 @@ TEST(Structure, WhatAnotherAxisFeltBeforeIsOneStraightLine) {
   expect_only_structure(
       options, {"previous_pose", "bias",
                 "polynomial of degree 1 in the change of the component of the next axis since"});
+}
+
+/// What a spring that is drawn against friction holds, 1 at most: in small steps along the way.
+class SpringWithFriction {
+ public:
+  explicit SpringWithFriction(double reach_g) : reach_g_(reach_g) {}
+  double operator()(double to_g) {
+    if (!at_g_) at_g_ = to_g;
+    constexpr int kParts = 2000;
+    const double step = (to_g - *at_g_) / (kParts * reach_g_);
+    for (int k = 0; k < kParts; ++k) held_ += step * (held_ * step > 0 ? 1 - std::abs(held_) : 1);
+    at_g_ = to_g;
+    return held_;
+  }
+
+ private:
+  double reach_g_, held_ = 0;
+  std::optional<double> at_g_;
+};
+
+/// The way a value moved last: 1 up, −1 down.
+class LastWay {
+ public:
+  double operator()(double now) {
+    constexpr double kMoved = 1e-9;
+    if (std::abs(now - at_) > kMoved) way_ = now > at_ ? 1 : -1;
+    at_ = now;
+    return way_;
+  }
+
+ private:
+  double at_ = 0, way_ = 0;
+};
+
+// Of small moves in rings the head learns what large ones do: a polynomial of the move would not.
+TEST(Structure, WhatIsDrawnAgainstFrictionGoesNoFurtherThanItsReach) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [spring = SpringWithFriction(0.2)](const auto& a_g, double) mutable {
+    return 1e-3 * spring(a_g[0]);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"previous_pose", "bias", "friction"});
+  ASSERT_EQ(found.parameters.size(), 3U);
+  EXPECT_NEAR(found.parameters[0].value, 0.2, 4 * found.parameters[0].u);
+  EXPECT_EQ(found.parameters[1].value, 0);
+}
+
+// With next to no reach only the side is left.
+TEST(Structure, HysteresisOfAnotherAxisIsFrictionInItsComponent) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 20;
+  options.more_x_V = [way = LastWay()](const auto& a_g, double) mutable {
+    return 5e-4 * way(a_g[1]);
+  };
+  expect_only_structure(options,
+                        {"previous_pose", "bias", "friction in the component of the next axis"});
+}
+
+// A loop that closes at both ends of the range.
+TEST(Structure, ALoopLikeALeafIsHysteresisLessWhatTheSquareOfTheForceTakes) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_x_V = [way = LastWay()](const auto& a_g, double) mutable {
+    return 6e-4 * (1 - a_g[0] * a_g[0]) * way(a_g[0]);
+  };
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  EXPECT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.hysteresis")));
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
+  EXPECT_EQ(result.diagnosis.unlisted[0].shape,
+            "friction, times its own component and its own component");
+  EXPECT_LT(result.after.heldout_pose_rms_mps2[0], 1.3 * result.floor_pose_rms_mps2[0]);
 }
 
 }  // namespace

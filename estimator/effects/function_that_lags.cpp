@@ -1,0 +1,177 @@
+// What follows a driver late, by how far it went and not by the time that passed.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "estimator/effects/driven_term.h"
+
+namespace plumbline {
+namespace {
+
+/// The way to a visit leads over all visits before it: it is gone once for all of them, and kept
+/// for those that are asked for next. The last parameter is the amplitude.
+class Lag : public DrivenTerm {
+ public:
+  Lag(DriverPointer driver, const Target& target, std::size_t shapes)
+      : DrivenTerm(std::move(driver), target), shapes_(shapes) {}
+
+  bool remembers() const override { return true; }
+  bool guesses_at_start() const override { return true; }
+
+ private:
+  /// At every visit, for an amplitude of 1.
+  virtual std::vector<double> course(std::size_t axis, const double* shape) const = 0;
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    struct Kept {
+      std::uint64_t of = 0;
+      std::size_t axis = 0;
+      std::vector<double> shape, course;
+    };
+    constexpr std::size_t kMost = 8;  // such terms in one model
+    thread_local std::array<Kept, kMost> all;
+    thread_local std::size_t next = 0;
+    auto kept = std::find_if(all.begin(), all.end(), [&](const Kept& k) {
+      return k.of == number_ && k.axis == axis && std::equal(k.shape.begin(), k.shape.end(), p);
+    });
+    if (kept == all.end()) {
+      kept = all.begin() + static_cast<std::ptrdiff_t>(next++ % kMost);
+      *kept = {number_, axis, {p, p + shapes_}, course(axis, p)};
+    }
+    return p[shapes_] * kept->course[visit];
+  }
+  /// Unlike its address, no other term ever has it.
+  static std::uint64_t next_number() {
+    static std::atomic<std::uint64_t> last = 0;
+    return ++last;
+  }
+
+  std::size_t shapes_;
+  std::uint64_t number_ = next_number();
+};
+
+class PlayLag final : public Lag {
+ public:
+  PlayLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 1) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : effect::geometric(0.01, 0.64, 7))
+      if (goes_to_and_fro(axis, share * (high - low)))
+        starts.push_back({{share * (high - low), target().typical_size()}});
+    return starts;
+  }
+  // Wherever a visit begins to draw or ceases to, the fit may stop.
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    std::vector<Hypothesis> others;
+    for (const double off : effect::geometric(0.004, 0.12, 6))
+      for (const double ratio : {1 - off, 1 + off})
+        others.push_back({{ratio * found.p[0], found.p[1]}});
+    return others;
+  }
+
+ private:
+  std::string function() const override { return "lag behind a play"; }
+  /// Drawn along in one direction only, the lag is a function of the driver itself.
+  bool goes_to_and_fro(std::size_t axis, double width) const {
+    const std::vector<double>& driver = variable().value[axis];
+    const double half = 0.5 * width;
+    bool up = false, down = false;
+    double follower = driver.front();
+    for (const double value : driver) {
+      up |= value - half > follower;
+      down |= value + half < follower;
+      follower = std::clamp(follower, value - half, value + half);
+    }
+    return up && down;
+  }
+  std::vector<double> course(std::size_t axis, const double* shape) const override {
+    const std::vector<double>& driver = variable().value[axis];
+    const double half = 0.5 * std::abs(shape[0]);
+    std::vector<double> lag(driver.size());
+    double follower = 0;
+    for (std::size_t k = 0; k < driver.size(); ++k) {
+      if (variable().way_begins(k)) follower = driver[k];
+      follower = std::clamp(follower, driver[k] - half, driver[k] + half);
+      lag[k] = follower - driver[k];
+    }
+    return lag;
+  }
+};
+
+/// Friction in a spring: what was drawn to one side is at the end of its reach, and gives back
+/// before it is drawn to the other (Dahl 1968; with `release` other than 1 Bouc and Wen).
+class FrictionLag final : public Lag {
+ public:
+  FrictionLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 2) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"reach", "", ParameterRole::shape},
+            {"release", "", ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr double kRelease = 0.5;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double share : effect::geometric(0.02, 0.5, 5))
+      starts.push_back({{share * (high - low), kRelease, target().typical_size()}});
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    std::vector<Hypothesis> others;
+    for (const double release : {0.0, 0.25, 0.75, 1.0, 1.5})
+      others.push_back({{found.p[0], release, found.p[2]}});
+    // Where all is drawn to the end, little tells how long the reach is.
+    for (const double ratio : {0.03, 0.1, 0.3})
+      others.push_back({{ratio * found.p[0], found.p[1], found.p[2]}});
+    return others;
+  }
+
+ private:
+  std::string function() const override { return "friction"; }
+  std::vector<double> course(std::size_t axis, const double* shape) const override {
+    const std::vector<double>& driver = variable().value[axis];
+    const double reach = std::abs(shape[0]), release = shape[1];
+    std::vector<double> drawn(driver.size());
+    for (std::size_t k = 1; reach > 0 && k < driver.size(); ++k)
+      if (!variable().way_begins(k))
+        drawn[k] = drawn_on(drawn[k - 1], (driver[k] - driver[k - 1]) / reach, release);
+    return drawn;
+  }
+  /// From −1 to 1, after a way in units of the reach.
+  static double drawn_on(double drawn, double way, double release) {
+    const double side = way < 0 ? -1 : 1;
+    double along = side * drawn, left = std::abs(way);
+    if (along < 0) {
+      const double to_nothing = release > 0 ? std::log1p(-release * along) / release : -along;
+      if (left < to_nothing) {
+        const double given_back = release > 0 ? -std::expm1(-release * left) / release : left;
+        return side * (along + given_back * (1 - release * along));
+      }
+      left -= to_nothing;
+      along = 0;
+    }
+    return side * (1 - (1 - along) * std::exp(-left));
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
+  return std::make_unique<PlayLag>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> friction(DriverPointer driver, const Target& target) {
+  return std::make_unique<FrictionLag>(std::move(driver), target);
+}
+
+}  // namespace plumbline
