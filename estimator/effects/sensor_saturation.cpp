@@ -16,9 +16,11 @@ class Saturation final : public Effect {
     return {{"L", "g", ParameterRole::shape}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kSteps = 16;
     std::vector<Hypothesis> starts;
+    starts.reserve(kSteps);
     // Near the largest response few readings tell one limit from the next.
-    for (int step = 0; step < 16; ++step) starts.push_back({{0.5 + 0.03 * step}});
+    for (int step = 0; step < kSteps; ++step) starts.push_back({{0.5 + 0.03 * step}});
     for (const double L_g : {0.965, 0.98, 0.99}) starts.push_back({{L_g}});
     return starts;
   }
