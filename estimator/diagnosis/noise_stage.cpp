@@ -184,11 +184,11 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       stage.noise[i] = pool(own_V2);
       // Where the response is nothing but steps, only the visits near their edges say anything.
       if (has_effect_on(parameters, i) && !input.log.codes[i].coarser_lattice) {
-        constexpr double kMatters = 0.1;
+        constexpr double kShareThatMatters = 0.1;
         const double mean_V2 = (stage.noise[i].covariance.diagonal() - left_open_V2[i]).mean();
         const Eigen::VectorXd crossing_V2 =
             crossing_variance_V2(input.log, parameters, i, predicted[i], std::sqrt(mean_V2));
-        if (crossing_V2.maxCoeff() > kMatters * mean_V2) {
+        if (crossing_V2.maxCoeff() > kShareThatMatters * mean_V2) {
           stage.crossing_V2[i] = left_open_V2[i] + crossing_V2;
           stage.noise[i] = pool(own_V2 + crossing_V2);
         }

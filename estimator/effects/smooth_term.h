@@ -15,10 +15,10 @@ enum class TermForm { bias, scale, geometry, sample };
 const char* to_string(TermForm form);
 
 /// A function of one variable with free coefficients: a polynomial, a harmonic series, a wave, a
-/// bell, a train of pulses, a bend, a step, a decay, a play, or a course over the dwell; of the
-/// variable as it is or of what it was on average lately. What is sharp has a shape of its own, so
-/// that the rest of it is not taken for effects with a name. The range in which the variable was
-/// seen is part of its parameters, so that it means the same on another set.
+/// bell, a train of pulses, a bend, a step, a decay, a play, friction, or a course over the dwell;
+/// of the variable as it is or of what it was on average lately. What is sharp has a shape of its
+/// own, so that the rest of it is not taken for effects with a name. The range in which the
+/// variable was seen is part of its parameters, so that it means the same on another set.
 class SmoothTerm : public Effect {
  public:
   virtual const std::string& driver() const = 0;  ///< "t_s", "rh_pct", "temp_C.rate" …

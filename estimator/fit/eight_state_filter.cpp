@@ -2,6 +2,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <unsupported/Eigen/MatrixFunctions>
 
@@ -14,8 +15,6 @@ double squared(double value) { return value * value; }
 // compiler maps them to whatever vectors there are. Each of the two functions exists once for any
 // processor and once for those with AVX2 and FMA.
 using Four = double __attribute__((vector_size(32)));
-/// The same in memory, at any double.
-using FourAt = double __attribute__((vector_size(32), aligned(8), may_alias));
 
 struct Column {
   Four top;
@@ -23,13 +22,19 @@ struct Column {
 };
 
 // Vectors never pass through a call: without AVX there is no agreed way to.
+[[gnu::always_inline]] inline void load(const double* from, Four& rows) {
+  std::memcpy(&rows, from, sizeof rows);
+}
+[[gnu::always_inline]] inline void store(const Four& rows, double* to) {
+  std::memcpy(to, &rows, sizeof rows);
+}
 [[gnu::always_inline]] inline void load(const double* from, Column& c) {
-  c.top = *reinterpret_cast<const FourAt*>(from);
-  c.bottom = *reinterpret_cast<const FourAt*>(from + 4);
+  load(from, c.top);
+  load(from + 4, c.bottom);
 }
 [[gnu::always_inline]] inline void store(const Column& c, double* to) {
-  *reinterpret_cast<FourAt*>(to) = c.top;
-  *reinterpret_cast<FourAt*>(to + 4) = c.bottom;
+  store(c.top, to);
+  store(c.bottom, to + 4);
 }
 
 constexpr std::size_t kSize = kEightStateCount;
@@ -43,14 +48,16 @@ constexpr std::size_t kSize = kEightStateCount;
 [[gnu::always_inline]] inline void carry(const double* same, const double* other,
                                          const double* noise, double noise_ramp, double* x,
                                          double* P) {
-  const Four kept = *reinterpret_cast<const FourAt*>(same);
-  const Four crossed = *reinterpret_cast<const FourAt*>(other);
+  Four kept, crossed;
+  load(same, kept);
+  load(other, crossed);
 #pragma GCC unroll 4
   for (std::size_t k = 0; k < 4; ++k) {
-    auto* const lower = reinterpret_cast<FourAt*>(P + kSize * k + 4);
-    Four rows = *lower;
+    double* const lower = P + kSize * k + 4;
+    Four rows;
+    load(lower, rows);
     carry_rows(kept, crossed, rows);
-    *lower = rows;
+    store(rows, lower);
   }
   Column flicker, walk, ramp, rate;
   load(P + kSize * kStateFlicker, flicker);
@@ -74,9 +81,10 @@ constexpr std::size_t kSize = kEightStateCount;
   c.bottom += Four{0, 0, noise_ramp, noise[kStateRampRate]};
   store(c, P + kSize * kStateRampRate);
   for (std::size_t k = 0; k < 4; ++k) P[(kSize + 1) * k] += noise[k];
-  Four states = *reinterpret_cast<const FourAt*>(x + 4);
+  Four states;
+  load(x + 4, states);
   carry_rows(kept, crossed, states);
-  *reinterpret_cast<FourAt*>(x + 4) = states;
+  store(states, x + 4);
 }
 
 [[gnu::always_inline]] inline double dot(const Column& a, const Column& b) {
