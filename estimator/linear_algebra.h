@@ -1,4 +1,5 @@
-// What the dense algebra of the core needs from OpenBLAS, which does Eigen's products.
+// What the dense algebra of the core needs from OpenBLAS, which does Eigen's products, and of the
+// memory that its matrices live in.
 #pragma once
 
 #include <Eigen/Core>

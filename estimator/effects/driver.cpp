@@ -40,10 +40,11 @@ PerAxis<std::vector<double>> changes_g(const VisitLog& log) {
   return change_g;
 }
 
-/// δ's, the shorter way round.
+/// What δ turned by on the way to a visit, the shorter way round; nothing after a long rest.
 double turn_rad(const VisitLog& log, std::size_t visit) {
-  return std::remainder(log.visits[visit].delta_rad - log.before(visit)->delta_rad,
-                        2 * std::numbers::pi);
+  const Visit* before = log.before(visit);
+  if (before == nullptr) return 0;
+  return std::remainder(log.visits[visit].delta_rad - before->delta_rad, 2 * std::numbers::pi);
 }
 
 // Slope between the neighbours of a visit, per hour.
@@ -77,6 +78,23 @@ std::vector<double> direction_of_h(const VisitLog& log) {
     direction[k] = std::abs(change_rad) < kMoved_rad ? direction[k - 1] : change_rad > 0 ? 1 : -1;
   }
   return direction;
+}
+
+/// What each axis has of its own, had from the next axis and from the one after that; their
+/// component stands between `before` and `after`.
+std::vector<Driver> of_other_axes(const Driver& own, const std::string& before,
+                                  const std::string& after) {
+  std::vector<Driver> drivers;
+  for (std::size_t other = 1; other < kAxisCount; ++other) {
+    Driver& driver = drivers.emplace_back(own);
+    driver.past = before;
+    driver.past +=
+        other == 1 ? "component of the next axis" : "component of the axis after the next";
+    driver.past += after;
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      driver.value[i] = own.value[(i + other) % kAxisCount];
+  }
+  return drivers;
 }
 
 struct Column {
@@ -162,28 +180,17 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
 }
 
 std::vector<Driver> changes_of_others(const VisitLog& log) {
-  const PerAxis<std::vector<double>> change_g = changes_g(log);
-  std::vector<Driver> drivers;
-  for (std::size_t other = 1; other < kAxisCount; ++other) {
-    Driver& driver = drivers.emplace_back(
-        Driver{"previous_pose",
-               other == 1 ? "change of the component of the next axis since"
-                          : "change of the component of the axis after the next since",
-               {}});
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      driver.value[i] = change_g[(i + other) % kAxisCount];
-    driver.span = about_zero(driver.value);
-  }
-  return drivers;
+  Driver own{"previous_pose", "", changes_g(log)};
+  own.span = about_zero(own.value);
+  return of_other_axes(own, "change of the ", " since");
 }
 
 std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   PerAxis<std::vector<double>> size_g = changes_g(log);
   for (std::vector<double>& of_axis : size_g)
     for (double& value : of_axis) value = std::abs(value);
-  const auto size_rad = for_all_axes(log, [&](std::size_t k) {
-    return log.before(k) == nullptr ? 0.0 : std::abs(turn_rad(log, k));
-  });
+  const auto size_rad =
+      for_all_axes(log, [&](std::size_t k) { return std::abs(turn_rad(log, k)); });
   std::vector<Driver> drivers = {
       {"previous_pose", "size of the change of a_i since", std::move(size_g)},
       {"previous_pose", "size of the turn of delta since", size_rad}};
@@ -199,18 +206,7 @@ Driver load(const VisitLog& log) {
 }
 
 std::vector<Driver> loads_of_others(const VisitLog& log) {
-  const Driver own = load(log);
-  std::vector<Driver> drivers;
-  for (std::size_t other = 1; other < kAxisCount; ++other) {
-    Driver& driver = drivers.emplace_back(
-        Driver{"previous_pose",
-               other == 1 ? "component of the next axis" : "component of the axis after the next",
-               {}});
-    driver.begins_anew = own.begins_anew;
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      driver.value[i] = own.value[(i + other) % kAxisCount];
-  }
-  return drivers;
+  return of_other_axes(load(log), "", "");
 }
 
 }  // namespace plumbline

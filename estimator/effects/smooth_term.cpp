@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -70,22 +69,13 @@ class TermList {
       : log_(log), any_(selection == SmoothTermSelection::any) {}
 
   void add_all() {
-    for (Driver& each : instantaneous_drivers(log_)) {
-      const auto driver = std::make_shared<const Driver>(std::move(each));
-      // A variable that never varied drives nothing.
-      if (any_ || driver->varies()) add_of(driver);
-    }
+    const auto add_line = [&](const DriverPointer& driver) { add_polynomials(driver, kBias, {1}); };
+    for_each(instantaneous_drivers(log_), [&](const DriverPointer& driver) { add_of(driver); });
     add_of_two();
-    for (Driver& each : loads_of_others(log_)) {
-      const auto driver = std::make_shared<const Driver>(std::move(each));
-      if (any_ || driver->varies()) add(friction(driver, kBias));
-    }
-    std::vector<Driver> changes = changes_of_others(log_);
-    std::ranges::move(sizes_of_changes(log_), std::back_inserter(changes));
-    for (Driver& each : changes) {
-      const auto driver = std::make_shared<const Driver>(std::move(each));
-      if (any_ || driver->varies()) add_polynomials(driver, kBias, {1});
-    }
+    for_each(loads_of_others(log_),
+             [&](const DriverPointer& driver) { add(friction(driver, kBias)); });
+    for_each(changes_of_others(log_), add_line);
+    for_each(sizes_of_changes(log_), add_line);
     add_of_wound_up_spindle();
     const auto attitude = std::make_shared<const Driver>(load(log_));
     if (any_ || attitude->varies()) {
@@ -110,6 +100,14 @@ class TermList {
 
  private:
   void add(std::unique_ptr<SmoothTerm> term) { terms_.push_back(std::move(term)); }
+  /// A variable that never varied drives nothing.
+  template <class Use>
+  void for_each(std::vector<Driver> drivers, const Use& use) {
+    for (Driver& each : drivers) {
+      const auto driver = std::make_shared<const Driver>(std::move(each));
+      if (any_ || driver->varies()) use(driver);
+    }
+  }
   void add_polynomials(const DriverPointer& driver, const Target& target,
                        std::initializer_list<int> degrees) {
     for (const int degree : degrees)
@@ -235,10 +233,12 @@ class TermList {
   }
   /// Where the visits' positions are not the only thing that a pattern over them follows.
   void add_of_two() {
-    if (angles_.size() == 2) add(harmonic_times_harmonic(angles_[0], angles_[1], kBias));
     std::vector<DriverPointer> followed = columns_;
     if (clock_) followed.push_back(clock_);
-    if (angles_.size() == 2) followed.push_back(angles_[1]);
+    if (angles_.size() == 2) {
+      add(harmonic_times_harmonic(angles_[0], angles_[1], kBias));
+      followed.push_back(angles_[1]);
+    }
     for (const DriverPointer& driver : followed)
       for (const DriverPointer& angle : angles_) {
         if (driver == angle) continue;

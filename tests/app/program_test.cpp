@@ -35,7 +35,6 @@ std::vector<std::string> calibrate_arguments(const fs::path& folder, const fs::p
           out};
 }
 
-/// result.json without what may differ between two runs.
 TEST(Program, HelpAndVersionAreNoErrors) {
   const auto version = run_plumbline({"--version"});
   EXPECT_EQ(version.exit_code, 0);
