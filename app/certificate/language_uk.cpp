@@ -448,6 +448,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"bell", "дзвоноподібна функція"},
     {"window", "вікно"},
     {"train of pulses", "послідовність імпульсів"},
+    {"jump that dies away", "стрибок, що згасає"},
     {"bend", "злам"},
     {"straight line", "пряма"},
     {"step", "сходинка"},

@@ -310,6 +310,17 @@ CandidateResponses some_of(const CandidateResponses& responses,
   return some;
 }
 
+bool holds(const CandidateResponses& responses, std::size_t general, std::size_t special) {
+  constexpr double kLeft = 1e-6;  // of what it does
+  const CandidateResponses::Place &whole = responses.place[general],
+                                  &part = responses.place[special];
+  if (whole.group != part.group) return false;
+  const Eigen::MatrixXd& means = responses.groups[whole.group].means;
+  const Eigen::MatrixXd basis = orthonormal_basis(means.middleCols(whole.first, whole.count));
+  const Eigen::MatrixXd does = means.middleCols(part.first, part.count);
+  return (does - basis * (basis.transpose() * does)).norm() < kLeft * does.norm();
+}
+
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
     : responses_(responses), fit_(fit) {
   model_basis_ = orthonormal_basis(fit.whitened_jacobian);

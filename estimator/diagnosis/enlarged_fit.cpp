@@ -1,5 +1,6 @@
 #include "estimator/diagnosis/enlarged_fit.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -66,23 +67,22 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& whitened_jacobian) {
 /// Whether effects take the place of a sensitivity: next to nothing is known of it beside them. Of
 /// a response that is creep for the most part little is known at rest; that is no fault of a fit.
 bool leave_a_sensitivity_open(const EnlargedFit& fit) {
-  constexpr double kUncertain = 0.3, kByEffects = 10;
-  const auto uncertainty = [](const Eigen::MatrixXd& covariance, std::size_t axis) {
-    const auto own = static_cast<Eigen::Index>(4 * axis + axis);
-    return std::sqrt(covariance(own, own));
-  };
+  constexpr double kUncertain = 0.05, kByEffects = 10;  // of the axis's own, as a ratio
   const auto& effects = fit.parameters.effects;
   if (std::any_of(effects.begin(), effects.end(),
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
     return false;
   std::optional<Eigen::MatrixXd> alone;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double K_V_per_g = fit.parameters.twelve[i](static_cast<Eigen::Index>(i));
-    const double u_V_per_g = uncertainty(fit.covariance, i);
-    if (u_V_per_g < kUncertain * std::abs(K_V_per_g)) continue;
-    if (!alone) alone = covariance_of(fit.whitened_jacobian.leftCols(fit.parameters.first_free(0)));
-    if (u_V_per_g > kByEffects * uncertainty(*alone, i)) return true;
-  }
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    for (std::size_t component = 0; component < kAxisCount; ++component) {
+      const auto own = static_cast<Eigen::Index>(axis);
+      const auto k = static_cast<Eigen::Index>(4 * axis + component);
+      const double u_V_per_g = std::sqrt(fit.covariance(k, k));
+      if (u_V_per_g < kUncertain * std::abs(fit.parameters.twelve[axis](own))) continue;
+      if (!alone)
+        alone = covariance_of(fit.whitened_jacobian.leftCols(fit.parameters.first_free(0)));
+      if (u_V_per_g > kByEffects * std::sqrt((*alone)(k, k))) return true;
+    }
   return false;
 }
 
@@ -152,6 +152,8 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start,
                          int most_iterations) {
   constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
+  // The last digits of a model that is far from the readings tell nothing: it is only compared.
+  constexpr double kLastDigits = 1e-6, kShareOfExcess = 1e-5;
   const Eigen::Index rows =
       has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
   const Eigen::VectorXd measured = stacked_V(observed);
@@ -173,31 +175,46 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     fit.determined = diagonal.minCoeff() > kDetermined * diagonal.maxCoeff();
     if (!fit.determined) return fit;
 
-    const Eigen::VectorXd step =
-        norms.cwiseInverse().cwiseProduct(qr.solve(fit.whitened_residual.head(rows)));
+    const Eigen::VectorXd step = qr.solve(fit.whitened_residual.head(rows));
     bool improved = false, refused = false;
+    const auto try_step = [&](const Eigen::VectorXd& scaled_step, bool stopping_short) {
+      EnlargedParameters trial = fit.parameters;
+      trial.set_free_values(fit.parameters.free_values() + scaled_step.cwiseQuotient(norms));
+      if (stopping_short) stop_short_of_zero(fit.parameters, trial);
+      if (!makes_sense(trial, start)) {
+        refused = true;
+        return;
+      }
+      const Eigen::VectorXd residual = whitened_residual(trial);
+      const double chi2 = residual.squaredNorm();
+      if (!(chi2 <= fit.chi2 * (1 + 1e-12))) return;
+      improved = true;
+      const double excess = std::max(0.0, chi2 - 2 * static_cast<double>(rows));
+      fit.converged = fit.chi2 - chi2 < kLastDigits + kShareOfExcess * excess;
+      fit.parameters = trial;
+      fit.whitened_residual = residual;
+      fit.chi2 = chi2;
+    };
     const auto try_steps = [&](bool stopping_short) {
       double share = 1;
-      for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2) {
-        EnlargedParameters trial = fit.parameters;
-        trial.set_free_values(fit.parameters.free_values() + share * step);
-        if (stopping_short) stop_short_of_zero(fit.parameters, trial);
-        if (!makes_sense(trial, start)) {
-          refused = true;
-          continue;
-        }
-        const Eigen::VectorXd residual = whitened_residual(trial);
-        const double chi2 = residual.squaredNorm();
-        if (!(chi2 <= fit.chi2 * (1 + 1e-12))) continue;
-        improved = true;
-        fit.converged = fit.chi2 - chi2 < 1e-6;
-        fit.parameters = trial;
-        fit.whitened_residual = residual;
-        fit.chi2 = chi2;
-      }
+      for (int halving = 0; halving < 8 && !improved; ++halving, share /= 2)
+        try_step(share * step, stopping_short);
     };
     try_steps(false);
     if (!improved && refused) try_steps(true);
+    if (!improved) {
+      // Along what the readings hardly determine, the tangent leads nowhere: shorter there only
+      // (Levenberg, Marquardt).
+      const Eigen::MatrixXd scaled =
+          fit.whitened_jacobian.topRows(rows) * norms.cwiseInverse().asDiagonal();
+      const Eigen::MatrixXd normal = scaled.transpose() * scaled;
+      const Eigen::VectorXd slope = scaled.transpose() * fit.whitened_residual.head(rows);
+      for (double damping = 1e-6; damping <= 1 && !improved; damping *= 100) {
+        Eigen::MatrixXd damped = normal;
+        damped.diagonal().array() += damping;
+        try_step(damped.ldlt().solve(slope), true);
+      }
+    }
     if (!improved) fit.converged = true;  // no direction leads down any more
   }
   fit.covariance = covariance_of(fit.whitened_jacobian.topRows(rows));

@@ -83,6 +83,10 @@ void EnlargedParameters::set_free_values(const Eigen::VectorXd& values) {
   }
 }
 
+double EnlargedParameters::mps2_per_V(std::size_t axis) const {
+  return kStandardGravity_mps2 / twelve[axis](static_cast<Eigen::Index>(axis));
+}
+
 std::vector<HeadGeometry> head_geometries(const VisitLog& log,
                                           const EnlargedParameters& parameters) {
   std::vector<HeadGeometry> heads;

@@ -38,6 +38,8 @@ struct EnlargedParameters {
   Eigen::Index first_free(std::size_t effect) const;
   Eigen::VectorXd free_values() const;
   void set_free_values(const Eigen::VectorXd& values);
+  /// m/s² per volt of residual: g_n / K_ii, signed.
+  double mps2_per_V(std::size_t axis) const;
 };
 
 /// Head and base at every visit with the model's head effects.

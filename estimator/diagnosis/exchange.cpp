@@ -79,7 +79,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     const double cost = chi2_beside(model, candidate, with) + model.price_in(with, index);
     const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
     if (!(cost < now - kClearly)) continue;
-    const double p = model.p_of(model.log_p_of(index, without, with, gains.dof(index)));
+    const double p = model.p_of(candidate, model.log_p_of(index, without, with, gains.dof(index)));
     if (p <= model.false_alarm(candidate)) exchanges.push_back({index, p, with.parameters});
   }
   return exchanges;
@@ -127,6 +127,90 @@ bool exchange_one(SearchModel& model) {
 
 namespace {
 
+/// Candidates of one effect, the likeliest of each axis that shows it, likeliest first.
+struct Kind {
+  const Effect* effect = nullptr;
+  std::vector<std::size_t> candidates = {};
+  double gain = 0;  ///< in χ², to first order
+  double price = 0;
+};
+std::vector<Kind> kinds_on_axes(const SearchModel& model, const CandidateGains& gains) {
+  const Eigen::VectorXd first_order = gains.of_residual();
+  std::vector<Kind> kinds;
+  for (const Scored& s : screen(model.list(), gains, first_order)) {
+    const Candidate& candidate = model.list().candidates[s.candidate];
+    if (!candidate.has_name() || candidate.effect->subject() != Subject::sensor ||
+        model.is_certain(candidate) ||
+        model.p_of(candidate, s.log_p) > model.false_alarm(candidate))
+      continue;
+    auto kind = std::find_if(kinds.begin(), kinds.end(),
+                             [&](const Kind& k) { return k.effect == candidate.effect; });
+    if (kind == kinds.end()) kind = kinds.insert(kinds.end(), Kind{.effect = candidate.effect});
+    if (std::any_of(kind->candidates.begin(), kind->candidates.end(), [&](std::size_t c) {
+          return model.list().candidates[c].axis == candidate.axis;
+        }))
+      continue;
+    kind->candidates.push_back(s.candidate);
+    kind->gain += first_order(static_cast<Eigen::Index>(s.candidate));
+    kind->price += model.price(s.candidate);
+  }
+  return kinds;
+}
+
+/// Effects of one kind in the place of a subset; empty if none are worth their price.
+std::vector<SearchModel::Entry> one_kind_for(const SearchModel& model,
+                                             const CandidateResponses& responses,
+                                             const std::vector<std::size_t>& subset) {
+  constexpr double kClearly = 2;
+  std::vector<SearchModel::Entry> best;
+  const EnlargedFit without = model.fit_without(subset);
+  if (!without.determined) return best;
+  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kClearly;
+  const CandidateGains gains(responses, without);
+  for (const Kind& kind : kinds_on_axes(model, gains)) {
+    constexpr double kMayGain = 1.1;  // more than to first order
+    if (kind.candidates.size() < 2 || without.chi2 - kMayGain * kind.gain + kind.price > least_cost)
+      continue;
+    EnlargedFit fit = without;
+    std::vector<SearchModel::Entry> entries;
+    for (const std::size_t c : kind.candidates) {
+      const Candidate& candidate = model.list().candidates[c];
+      EnlargedFit with = model.fit_with(fit.parameters, candidate.active());
+      if (!with.determined) break;
+      const auto dof = static_cast<double>(gains.dof(c));
+      entries.push_back({c, model.p_of(candidate, log_chi_squared_tail(fit.chi2 - with.chi2, dof)),
+                         with.parameters});
+      fit = std::move(with);
+    }
+    if (entries.size() < kind.candidates.size() || fit.chi2 + kind.price > least_cost) continue;
+    least_cost = fit.chi2 + kind.price;
+    best = std::move(entries);
+  }
+  return best;
+}
+
+}  // namespace
+
+bool exchange_for_one_kind(SearchModel& model) {
+  std::vector<std::size_t> all;
+  for (std::size_t k = 0; k < model.size(); ++k)
+    if (!model.is_certain(model.candidate(k))) all.push_back(k);
+  if (all.size() < 2) return false;
+  std::vector<std::vector<std::size_t>> subsets = {all};
+  for (std::size_t k = 0; all.size() > 2 && k < all.size(); ++k) {
+    subsets.push_back(all);
+    subsets.back().erase(subsets.back().begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  const CandidateResponses& responses = model.responses();
+  for (const auto& subset : subsets) {
+    const std::vector<SearchModel::Entry> kind = one_kind_for(model, responses, subset);
+    if (!kind.empty() && model.exchange(subset, kind)) return true;
+  }
+  return false;
+}
+
+namespace {
+
 /// What has no name: all of it, then what has the same driver and acts on the same, part by part.
 std::vector<std::vector<std::size_t>> unlisted_of(const SearchModel& model) {
   std::vector<std::vector<std::size_t>> subsets;
@@ -166,19 +250,21 @@ Named named_candidates(SearchModel& model) {
 }
 
 /// The likeliest of them beside a fit, if the search as a whole would not often find as much in
-/// noise, and the fit with it.
+/// noise and some `most` of them may gain so much in χ², and the fit with it.
 struct Next {
   SearchModel::Entry entry;
   EnlargedFit fit;
 };
 std::optional<Next> likeliest_beside(const SearchModel& model, const Named& named,
-                                     const EnlargedFit& fit) {
+                                     const EnlargedFit& fit, std::size_t most, double gain) {
   constexpr std::size_t kMostRefined = 4;
+  constexpr double kLater = 2;  // what follows may gain more than what comes first
   const CandidateGains gains(named.responses, fit);
   std::optional<Next> best;
   double best_score = std::numeric_limits<double>::infinity();
   std::size_t refined = 0;
   const Eigen::VectorXd first_order = gains.of_residual();
+  if (static_cast<double>(most) * kLater * first_order.maxCoeff() < gain) return {};
   for (const Scored& s : screen(named.list, gains, first_order)) {
     const Candidate& candidate = named.list.candidates[s.candidate];
     const bool is_there = std::any_of(
@@ -195,7 +281,7 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
     const double score = log_p + (s.score - s.log_p);
     if (score >= best_score) continue;
     best_score = score;
-    best = {{index, model.p_of(log_p), with.parameters}, std::move(with)};
+    best = {{index, model.p_of(candidate, log_p), with.parameters}, std::move(with)};
   }
   if (best && best->entry.p > model.false_alarm(model.list().candidates[best->entry.candidate]))
     best.reset();
@@ -213,7 +299,8 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
   double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kClearly, price = 0;
   EnlargedFit fit = model.fit_without(subset);
   while (fit.determined && names.size() < most) {
-    std::optional<Next> next = likeliest_beside(model, named, fit);
+    std::optional<Next> next =
+        likeliest_beside(model, named, fit, most - names.size(), fit.chi2 + price - least_cost);
     if (!next) break;
     price += model.price_in(next->fit, next->entry.candidate);
     names.push_back(std::move(next->entry));

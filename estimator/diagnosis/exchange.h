@@ -12,6 +12,11 @@ namespace plumbline {
 /// Whether there was one.
 bool exchange_one(SearchModel& model);
 
+/// Replaces all of the model's effects, or all but one, by effects of one kind, each on an axis of
+/// its own, that explain as much for less: what the triad has in common looks like the head's
+/// doing. Whether there were any.
+bool exchange_for_one_kind(SearchModel& model);
+
 /// What has no name gives way to effects that have one, as many as it takes, where these are worth
 /// their price: two of them together may have looked like one structure.
 bool name_unlisted(SearchModel& model);

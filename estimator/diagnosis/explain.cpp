@@ -7,10 +7,9 @@
 #include "estimator/diagnosis/code_estimate.h"
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
-#include "estimator/diagnosis/heldout.h"
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/separation.h"
-#include "estimator/diagnosis/stuck_bits.h"
+#include "estimator/diagnosis/validated_search.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/diagnosis/wander.h"
 #include "estimator/error_figures.h"
@@ -22,42 +21,12 @@
 namespace plumbline {
 namespace {
 
-double mps2_per_V(const EnlargedParameters& model, std::size_t axis) {
-  return kStandardGravity_mps2 / model.twelve[axis](static_cast<Eigen::Index>(axis));
-}
-
 /// The means of which errors are stated: as measured where that is all that most of them say.
 PerAxis<Eigen::VectorXd> stated_means_V(const SearchInput& search, const SearchResult& found) {
   PerAxis<Eigen::VectorXd> means_V = found.observed.mean_V;
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (found.beyond_V2[i]) means_V[i] = search.observed.mean_V[i];
   return means_V;
-}
-
-/// Held-out errors of both partitions, m/s², one vector of 2n per axis.
-PerAxis<Eigen::VectorXd> heldout_mps2(const Heldout& heldout, const std::vector<Blocks>& partitions,
-                                      const EnlargedFit& fit) {
-  const auto parts = heldout.leave_out(fit, partitions);
-  PerAxis<Eigen::VectorXd> all;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    all[i].resize(parts[0].residual_V[i].size() + parts[1].residual_V[i].size());
-    all[i] << parts[0].residual_V[i], parts[1].residual_V[i];
-    all[i] *= mps2_per_V(fit.parameters, i);
-  }
-  return all;
-}
-
-/// Share of the excess held-out residual power that an effect removes.
-double heldout_gain(const std::vector<LeftOut>& without, const std::vector<LeftOut>& with,
-                    const std::vector<std::size_t>& axes) {
-  double power_without = 0, power_with = 0, expected = 0;
-  for (std::size_t part = 0; part < with.size(); ++part)
-    for (const std::size_t axis : axes) {
-      power_without += without[part].power[axis];
-      power_with += with[part].power[axis];
-      expected += static_cast<double>(with[part].residual_V[axis].size());
-    }
-  return share_removed(power_without, power_with, expected);
 }
 
 /// Four parameters of one axis out of the joint estimate.
@@ -140,56 +109,6 @@ AxisEstimate filter_estimate(const ExplainInput& input, const SearchInput& searc
   return filter.parameters();
 }
 
-/// A model without one of its effects, and the share of the left-out excess that the effect
-/// removes.
-struct Without {
-  EnlargedFit fit;
-  double gain = 0;
-};
-Without without_one(const SearchInput& search, const Heldout& heldout,
-                    const std::vector<Blocks>& partitions, const SearchResult& found,
-                    const std::vector<LeftOut>& with, std::size_t k) {
-  const ActiveEffect& removed = found.fit.parameters.effects[k];
-  Without without{fit_enlarged(search.log, found.observed, found.whitening,
-                               without_effect(found.fit.parameters, k))};
-  if (!without.fit.determined) return without;
-  // What changes within the dwell may hardly be seen in the means.
-  without.gain = std::max(
-      heldout_gain(heldout.leave_out(without.fit, partitions), with, axes_of(removed)),
-      heldout_dwell_gain(search.log, found.observed, found.whitening, found.fit, k, partitions));
-  return without;
-}
-
-/// Effects that do not help where they were not fitted are no effects. Says which were dropped, one
-/// after the other, by their places in what was left of the model; `gains`: of those that stay.
-std::vector<std::size_t> drop_what_does_not_carry(const SearchInput& search, const Heldout& heldout,
-                                                  const std::vector<Blocks>& partitions,
-                                                  SearchResult& found, std::vector<double>& gains) {
-  std::vector<std::size_t> all_dropped;
-  for (bool dropped = true; dropped && !found.evidence.empty();) {
-    dropped = false;
-    gains.clear();
-    const auto with = heldout.leave_out(found.fit, partitions);
-    for (std::size_t k = 0; k < found.evidence.size(); ++k) {
-      const ActiveEffect& active = found.fit.parameters.effects[k];
-      Without without = without_one(search, heldout, partitions, found, with, k);
-      // One pose's own error cannot be predicted from other poses.
-      const bool own =
-          active.effect->concerns_one_visit() || active.effect->certain(search.log, active.axis);
-      if (without.gain > 0 || own || !without.fit.determined) {
-        gains.push_back(std::max(without.gain, 0.0));
-        continue;
-      }
-      found.remove(k);
-      found.fit = std::move(without.fit);
-      all_dropped.push_back(k);
-      dropped = true;
-      break;
-    }
-  }
-  return all_dropped;
-}
-
 /// By how much the readings are others where what the search chose, like where the steps of a
 /// converter begin, is one standard deviation away, each independent of the others; stacked.
 std::vector<Eigen::VectorXd> choice_deviations_V(const VisitLog& log,
@@ -222,79 +141,6 @@ Eigen::MatrixXd with_allowances(const SearchInput& search, const SearchResult& f
   return covariance;
 }
 
-/// What a search found.
-struct Searched {
-  std::unique_ptr<const VisitLog> log;  ///< that `codes` are from; null: that of the search
-  CandidateList candidates;
-  SearchResult found;
-  std::optional<CodeEstimate> codes;
-};
-
-Searched search_readings(const ExplainInput& input, const SearchInput& search,
-                         const CalibrationOptions& options) {
-  SearchOptions search_options;
-  search_options.seed = options.seed;
-  if (auto beside_bits = search_beside_stuck_bits(
-          search, input.input, design_matrix(input.poses, input.input.description.gravity),
-          options.own_effects, search_options))
-    return {std::move(beside_bits->log), std::move(beside_bits->candidates),
-            std::move(beside_bits->found), std::move(beside_bits->given_back)};
-  CandidateList candidates = all_candidates(search.log, options.own_effects);
-  SearchResult found = search_effects(search, candidates, search_options);
-  return {nullptr, std::move(candidates), std::move(found), std::nullopt};
-}
-
-/// Effects with which the poses that were left out of the fit come out far worse than by the 12
-/// parameters are none, however much more like noise they make the rest: those of the axis go.
-void drop_what_worsens(const SearchInput& search, const Heldout& heldout,
-                       const std::vector<Blocks>& partitions, const PerAxis<double>& before_mps2,
-                       Searched& searched) {
-  constexpr double kFar = 2;  // slow noise alone may make it worse by a little
-  SearchResult& found = searched.found;
-  const std::size_t size = found.evidence.size();
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (!(rms(heldout_mps2(heldout, partitions, found.fit)[axis]) > kFar * before_mps2[axis]))
-      continue;
-    for (std::size_t k = found.evidence.size(); k-- > 0;) {
-      const ActiveEffect& active = found.fit.parameters.effects[k];
-      if (active.effect->subject() == Subject::sensor && active.axis == axis &&
-          !active.effect->certain(search.log, axis))
-        found.remove(k);
-    }
-    found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
-  }
-  if (found.evidence.size() < size)
-    found.responses =
-        candidate_responses(search.log, searched.candidates, found.whitening, found.fit.parameters);
-}
-
-/// Leaves of `searched` what carries over to poses that were left out; returns the gains there.
-/// `heldout` is that of what was found, `estimated` the input that the codes are from.
-std::vector<double> keep_what_carries(const SearchInput& search, const SearchInput& estimated,
-                                      const Heldout& heldout, const std::vector<Blocks>& partitions,
-                                      Searched& searched) {
-  SearchResult& found = searched.found;
-  std::vector<double> gains;
-  std::vector<std::size_t> dropped;
-  if (searched.codes) {
-    // Edges of the bits hide what carries over.
-    SearchResult& without = searched.codes->before_converter;
-    dropped = drop_what_does_not_carry(
-        estimated, Heldout(estimated.log, without.observed.mean_V, without.whitening), partitions,
-        without, gains);
-    drop_effects(search, dropped, found, *searched.codes);
-    const auto with = heldout.leave_out(found.fit, partitions);
-    for (std::size_t k = gains.size(); k < found.evidence.size(); ++k)
-      gains.push_back(std::max(0.0, without_one(search, heldout, partitions, found, with, k).gain));
-  } else {
-    dropped = drop_what_does_not_carry(search, heldout, partitions, found, gains);
-  }
-  if (!dropped.empty())
-    found.responses =
-        candidate_responses(search.log, searched.candidates, found.whitening, found.fit.parameters);
-  return gains;
-}
-
 }  // namespace
 
 std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -305,7 +151,11 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   for (std::size_t i = 0; i < kAxisCount; ++i) start.twelve[i] = result.estimates.batch_ls[i].value;
   const SearchInput search{log,   observed,     input.noise, input.processes, input.known_V2,
                            start, &input.pooled};
-  Searched searched = search_readings(input, search, options);
+  SearchOptions search_options;
+  search_options.seed = options.seed;
+  ValidatedSearch searched =
+      search_validated(search, input.input, input.poses, result.before.heldout_pose_rms_mps2,
+                       options.own_effects, search_options);
   SearchResult& found = searched.found;
   const auto add_noise_to = [&](Diagnosis& diagnosis, const EnlargedParameters& model) {
     add_noise(input.noise_follows, model, diagnosis);
@@ -322,23 +172,15 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   const VisitLog& estimated_log = searched.log ? *searched.log : log;
   const SearchInput estimated_search{estimated_log,   observed, input.noise,  input.processes,
                                      search.known_V2, start,    &input.pooled};
-  const PerAxis<Eigen::VectorXd>& mean_V = found.observed.mean_V;
-  const Heldout heldout(log, mean_V, found.whitening);
-  const std::vector<Blocks> partitions = {time_blocks(input.poses), position_blocks(input.poses)};
-  if (!searched.codes)
-    drop_what_worsens(search, heldout, partitions, result.before.heldout_pose_rms_mps2, searched);
-  const std::vector<double> gains =
-      keep_what_carries(search, estimated_search, heldout, partitions, searched);
-  if (found.evidence.empty()) return without_effects();
   std::optional<CodeEstimate>& codes = searched.codes;
   if (!codes) codes = estimate_from_codes(search, input.input.run, found);
 
   // Leaving out and the expected residual want the covariance under the noise that was used.
   const PerAxis<Eigen::VectorXd> stated_V = stated_means_V(search, found);
-  auto heldout_errors_mps2 = heldout_mps2(heldout, partitions, found.fit);
+  PerAxis<Eigen::VectorXd>& heldout_errors_mps2 = searched.heldout_mps2;
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    heldout_errors_mps2[i] +=
-        mps2_per_V(found.fit.parameters, i) * (stated_V[i] - mean_V[i]).replicate<2, 1>();
+    heldout_errors_mps2[i] += found.fit.parameters.mps2_per_V(i) *
+                              (stated_V[i] - found.observed.mean_V[i]).replicate<2, 1>();
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   if (codes) {
@@ -353,7 +195,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   }
   Diagnosis diagnosis =
       describe_findings(search, searched.candidates, found, options.reach.value_or(reach_of(log)));
-  attach_gains(found.evidence, gains, diagnosis);
+  attach_gains(found.evidence, searched.gains, diagnosis);
   if (std::any_of(found.fit.parameters.effects.begin(), found.fit.parameters.effects.end(),
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
     diagnosis.history = history_of(log);
@@ -381,7 +223,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double factor = mps2_per_V(found.fit.parameters, i);
+    const double factor = found.fit.parameters.mps2_per_V(i);
     result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
     const auto first = 4 * static_cast<Eigen::Index>(i);
     result.final.ekf[i] = with_gravity(

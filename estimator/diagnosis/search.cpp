@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -34,7 +35,9 @@ class Search {
       grow();
     }
     constexpr int kMostExchanges = 4;
-    for (int k = 0; k < kMostExchanges && exchange_one(model_); ++k) model_.drop_superfluous();
+    for (int k = 0; k < kMostExchanges && (exchange_for_one_kind(model_) || exchange_one(model_));
+         ++k)
+      model_.drop_superfluous();
     SearchResult result = model_.take_result();
     result.p_best_rest = p_best_rest_;
     return result;
@@ -93,13 +96,19 @@ class Search {
       const Candidate& c = list_.candidates[s.candidate];
       const double false_alarm = model_.false_alarm(c);
       return model_.is_dropped(c) || model_.is_chosen(c) ||
-             (false_alarm < options_.false_alarm && model_.p_of(s.log_p) > false_alarm);
+             (false_alarm < options_.false_alarm && model_.p_of(c, s.log_p) > false_alarm);
     });
+    const auto log_p_of_all = [&](const Scored& s) {
+      return s.log_p + std::log(model_.looks_of(list_.candidates[s.candidate]) / model_.looks());
+    };
+    for (Scored& s : ranked) s.score += log_p_of_all(s) - s.log_p;
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const Scored& a, const Scored& b) { return a.score < b.score; });
     if (ranked.empty()) return false;
-    const auto surest =
-        std::min_element(ranked.begin(), ranked.end(),
-                         [](const Scored& a, const Scored& b) { return a.log_p < b.log_p; });
-    p_best_rest_ = model_.p_of(surest->log_p);
+    const auto surest = std::min_element(
+        ranked.begin(), ranked.end(),
+        [&](const Scored& a, const Scored& b) { return log_p_of_all(a) < log_p_of_all(b); });
+    p_best_rest_ = model_.p_of(list_.candidates[surest->candidate], surest->log_p);
     if (p_best_rest_ > options_.false_alarm) return false;
 
     // First order ranks; the full response decides.
@@ -131,9 +140,32 @@ class Search {
       }
     }
     if (winner == nullptr) return replace_overlapping(ranked, gains);
-    const double p = model_.p_of(winner_log_p);
-    return p <= model_.false_alarm(list_.candidates[winner->candidate]) &&
-           model_.add({winner->candidate, p, with_winner});
+    const Candidate& won = list_.candidates[winner->candidate];
+    const double p = model_.p_of(won, winner_log_p);
+    if (p > model_.false_alarm(won)) return false;
+    if (!won.has_name() && add_special_case(winner->candidate, gains, first_order)) return true;
+    return model_.add({winner->candidate, p, with_winner});
+  }
+
+  /// Where a term without a name holds one with a name as a special case that does nearly as much,
+  /// that one comes first: what is left may be something else.
+  bool add_special_case(std::size_t general, const CandidateGains& gains,
+                        const Eigen::VectorXd& first_order) {
+    constexpr double kNearly = 0.9;
+    for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
+      const Candidate& special = list_.candidates[c];
+      const double promised = first_order(static_cast<Eigen::Index>(c));
+      if (!special.has_name() || model_.is_dropped(special) || model_.is_chosen(special) ||
+          promised < kNearly * first_order(static_cast<Eigen::Index>(general)) ||
+          !holds(model_.responses(), general, c))
+        continue;
+      const EnlargedFit with = model_.fit_with(gains, c, special, promised);
+      if (!with.determined) continue;
+      const double p =
+          model_.p_of(special, model_.log_p_of(c, model_.stage().fit, with, gains.dof(c)));
+      if (p <= model_.false_alarm(special) && model_.add({c, p, with.parameters})) return true;
+    }
+    return false;
   }
 
   /// A slow effect that the noise was estimated without is partly taken for slow noise, and then
@@ -172,9 +204,10 @@ class Search {
         const EnlargedFit with =
             model_.fit_with(without.parameters, list_.candidates[candidate].active());
         if (!with.determined) continue;
-        const double p =
-            model_.p_of(model_.log_p_of(candidate, model_.stage().fit, with, gains.dof(candidate)));
-        if (p <= model_.false_alarm(list_.candidates[candidate]) &&
+        const Candidate& newcomer = list_.candidates[candidate];
+        const double p = model_.p_of(
+            newcomer, model_.log_p_of(candidate, model_.stage().fit, with, gains.dof(candidate)));
+        if (p <= model_.false_alarm(newcomer) &&
             model_.exchange({k}, {candidate, p, with.parameters}))
           return true;
       }

@@ -95,7 +95,20 @@ bool SearchModel::is_dropped(const Candidate& candidate) const {
   return std::count(dropped_.begin(), dropped_.end(), candidate.family) > 0;
 }
 
-double SearchModel::p_of(double log_p_local) const { return p_of_search(log_p_local, looks_); }
+double SearchModel::looks_of(const Candidate& candidate) const {
+  const bool on_another_axis =
+      candidate.effect->subject() == Subject::sensor &&
+      std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
+        const Candidate& chosen = list_.candidates[k];
+        return chosen.effect == candidate.effect && chosen.axis != candidate.axis;
+      });
+  const double hypotheses = kAxisCount * static_cast<double>(list_.family_size[candidate.family]);
+  return on_another_axis ? std::min(looks_, hypotheses) : looks_;
+}
+
+double SearchModel::p_of(const Candidate& candidate, double log_p_local) const {
+  return p_of_search(log_p_local, looks_of(candidate));
+}
 
 bool SearchModel::shows_steps(std::size_t axis) const {
   constexpr double kFew = 0.5;  // of a step: with more noise the edges are washed out
@@ -157,10 +170,6 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
   return log_chi_squared_tail(sum, 2.0 * kAxisCount);
 }
 
-EnlargedFit SearchModel::fit(const EnlargedParameters& parameters) const {
-  return fit_enlarged(input_.log, stage_.observed, stage_.whitening, parameters);
-}
-
 EnlargedFit SearchModel::fit_with(const EnlargedParameters& model,
                                   const ActiveEffect& active) const {
   return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening,
@@ -177,7 +186,8 @@ EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) co
   EnlargedParameters fewer = stage_.fit.parameters;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k)
     fewer = without_effect(std::move(fewer), *k);
-  return fit(fewer);
+  // What is missing may drive the shapes of the others to where they change nothing.
+  return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening, fewer, 0);
 }
 
 bool SearchModel::adopt(const EnlargedParameters& parameters) {
@@ -307,17 +317,18 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects,
   return true;
 }
 
-double SearchModel::p_of_removal(const EnlargedFit& without) const {
+double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without) const {
   const auto free =
       static_cast<double>(stage_.fit.parameters.free_count() - without.parameters.free_count());
-  return p_of(log_chi_squared_tail(without.chi2 - stage_.fit.chi2, std::max(1.0, free)));
+  return p_of(candidate(effect),
+              log_chi_squared_tail(without.chi2 - stage_.fit.chi2, std::max(1.0, free)));
 }
 
 void SearchModel::drop_superfluous() {
   for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
     if (is_certain(candidate(k))) continue;
     const EnlargedFit without = fit_without({k});
-    if (!without.determined || p_of_removal(without) < false_alarm(candidate(k))) continue;
+    if (!without.determined || p_of_removal(k, without) < false_alarm(candidate(k))) continue;
     if (!adopt(without.parameters)) continue;
     dropped_.push_back(candidate(k).family);
     forget(k);

@@ -35,10 +35,13 @@ class SearchModel {
   /// What proved superfluous once would come back and go again.
   bool is_dropped(const Candidate& candidate) const;
 
-  /// How many independent looks the search amounts to; a p-value of the search as a whole.
+  /// How many independent looks the search amounts to.
   double looks() const { return looks_; }
   void set_looks(double looks) { looks_ = looks; }
-  double p_of(double log_p_local) const;
+  /// How many of them a candidate competes with: what one axis shows is asked of the others first.
+  double looks_of(const Candidate& candidate) const;
+  /// p-value of a candidate in the search as a whole.
+  double p_of(const Candidate& candidate, double log_p_local) const;
   /// What counts as significant: of a candidate, and among the slow ones of each axis.
   double false_alarm(const Candidate& candidate) const;
   PerAxis<double> false_alarm_of_slow() const;
@@ -59,9 +62,8 @@ class SearchModel {
   /// The candidates beside the model as it stands.
   const CandidateResponses& responses();
 
-  /// Fits with the noise as it stands: of any model, of one with one more effect, of one with one
-  /// more candidate (as fit_with_candidate()), of this one without some of its effects (ascending).
-  EnlargedFit fit(const EnlargedParameters& parameters) const;
+  /// Fits with the noise as it stands: of a model with one more effect, of one with one more
+  /// candidate (as fit_with_candidate()), of this one without some of its effects (ascending).
   EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const;
   EnlargedFit fit_with(const CandidateGains& gains, std::size_t place, const Candidate& candidate,
                        double promised) const;
@@ -92,7 +94,7 @@ class SearchModel {
   void forget(std::size_t effect);
   /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;
-  double p_of_removal(const EnlargedFit& without) const;
+  double p_of_removal(std::size_t effect, const EnlargedFit& without) const;
 
   const SearchInput& input_;
   const CandidateList& list_;

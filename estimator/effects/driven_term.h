@@ -74,6 +74,13 @@ class DrivenTerm : public SmoothTerm {
     return kPart * (range_.second - range_.first) /
            static_cast<double>(driver_->value.front().size());
   }
+  /// In the middle between the two visits that a time lies between.
+  double half_way_between_visits(double t_s) const {
+    const std::vector<double>& times_s = driver_->value[0];
+    const auto after = std::upper_bound(times_s.begin(), times_s.end(), t_s);
+    if (after == times_s.begin() || after == times_s.end()) return t_s;
+    return 0.5 * (*(after - 1) + *after);
+  }
   const std::pair<double, double>& range() const { return range_; }
   /// Whether the driver took enough different values to tell a polynomial of this degree.
   bool resolves(int degree) const {

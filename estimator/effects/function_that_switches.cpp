@@ -138,13 +138,55 @@ class Window final : public DrivenTerm {
   }
   /// Edges half way between the visits that these times lie between.
   Hypothesis half_way(double from, double to, double size) const {
-    const auto moved = [this](double time) {
-      const std::vector<double>& times = variable().value[0];
-      const auto after = std::upper_bound(times.begin(), times.end(), time);
-      if (after == times.begin() || after == times.end()) return time;
-      return 0.5 * (*(after - 1) + *after);
-    };
-    return {{moved(from), moved(to), size}};
+    return {{half_way_between_visits(from), half_way_between_visits(to), size}};
+  }
+};
+
+/// A shock: there at once, then it dies away.
+class Relaxation final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"from", "s", ParameterRole::index},
+            {"tau", "s", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kPlaces = 12;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int k = 1; k < kPlaces; ++k) add_from(low + (high - low) * k / kPlaces, starts);
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 16;
+    std::vector<Hypothesis> others;
+    for (int from = -kPlaces; from <= kPlaces; ++from) {
+      const double moved = half_way_between_visits(found.p[0] + 4 * part_of_spacing() * from);
+      if (moved > range().first) others.push_back({{moved, found.p[1], found.p[2]}});
+    }
+    return others;
+  }
+  /// What comes and goes again was taken for steps.
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& steps) const override {
+    std::vector<Hypothesis> found;
+    if (repeated.id() != "sensor.bias_step" || target().form != TermForm::bias) return found;
+    for (const auto& step : steps) add_from(step[1], found);
+    return found;
+  }
+
+ private:
+  std::string function() const override { return "jump that dies away"; }
+  double at(double t_s, const double* p) const override {
+    return t_s > p[0] ? p[2] * std::exp((p[0] - t_s) / p[1]) : 0;
+  }
+  void add_from(double from_s, std::vector<Hypothesis>& starts) const {
+    const double span_s = range().second - range().first;
+    for (const double tau_s : effect::geometric(span_s / 40, span_s / 4, 4))
+      starts.push_back({{half_way_between_visits(from_s), tau_s, target().typical_size()}});
   }
 };
 
@@ -194,7 +236,6 @@ class SawTooth final : public DrivenTerm {
         others.push_back({{found.p[0], found.p[1] * (1 + kReach * period / (teeth * kPlaces)),
                            found.p[2] + kReach * found.p[1] * at / kPlaces, found.p[3]}});
     // A fall between two visits, of which neither sees the edge.
-    constexpr double kSharp = 0.3;
     for (int at = -kPlaces; variable().is_clock() && at <= kPlaces; ++at)
       others.push_back({{kSharp * found.p[0], found.p[1], found.p[2] + 0.5 * part_of_spacing() * at,
                          found.p[3]}});
@@ -208,7 +249,7 @@ class SawTooth final : public DrivenTerm {
     const double fallen = 1 - effect::share_below(edge * p[1] + p[2], value, p[0]);
     return p[3] * (cycles - (edge - 1 + fallen) - 0.5);
   }
-  static constexpr double kFine = 0.1;
+  static constexpr double kFine = 0.1, kSharp = 0.3;  // of an edge
   /// Noise of single readings reaches over a fall; between two visits it could not be moved.
   double edge() const { return variable().scatter > 0 ? variable().scatter : part_of_spacing(); }
   /// Falls that were found one by one.
@@ -231,9 +272,18 @@ class SawTooth final : public DrivenTerm {
     const Eigen::ArrayXd off = tooth - tooth.mean();
     const double period = (off * (at - at.mean())).sum() / off.square().sum();
     // A step in time is told from the visit that follows it.
-    const double before = variable().is_clock() ? 2 * part_of_spacing() : 0;
-    found.push_back(
-        {{edge(), period, at.mean() - period * tooth.mean() - before, target().typical_size()}});
+    const bool clock = variable().is_clock();
+    const double before = clock ? 2 * part_of_spacing() : 0;
+    const double start = at.mean() - period * tooth.mean() - before, size = target().typical_size();
+    found.push_back({{edge(), period, start, size}});
+    if (!clock) return;
+    // Where a fall is large, one visit on its wrong side hides that all others are right.
+    constexpr int kPlaces = 4;
+    const double reach = 2 * part_of_spacing() / kPlaces, last = tooth(count - 1);
+    for (int first = -kPlaces; first <= kPlaces; ++first)
+      for (int end = -kPlaces; end <= kPlaces; ++end)
+        found.push_back({{kSharp * edge(), period + reach * (end - first) / last,
+                          start + reach * first, size}});
   }
   void add(double period, std::vector<Hypothesis>& starts) const {
     constexpr int kPlaces = 6;
@@ -247,6 +297,10 @@ class SawTooth final : public DrivenTerm {
 
 std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target) {
   return std::make_unique<Window>(std::move(clock), target);
+}
+
+std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target) {
+  return std::make_unique<Relaxation>(std::move(clock), target);
 }
 
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {

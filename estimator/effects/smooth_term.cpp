@@ -170,6 +170,7 @@ class TermList {
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));
     for (const Target& target : {kBias, kScale}) {
+      add(relaxation(clock, target));
       add(power(clock, target));
       add(logarithm(clock, target));
     }

@@ -1,0 +1,215 @@
+#include "estimator/diagnosis/validated_search.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "estimator/diagnosis/heldout.h"
+#include "estimator/diagnosis/stuck_bits.h"
+#include "estimator/error_figures.h"
+#include "estimator/fit/generalised_fit.h"
+
+namespace plumbline {
+namespace {
+
+/// What left-out poses say of models of the same readings.
+class Validation {
+ public:
+  /// log: that `found` is a model of; both must outlive this.
+  Validation(const VisitLog& log, const std::vector<PoseMean>& poses, const SearchResult& found)
+      : log_(log),
+        found_(found),
+        partitions_{time_blocks(poses), position_blocks(poses)},
+        heldout_(log, found.observed.mean_V, found.whitening) {}
+
+  std::vector<LeftOut> leave_out(const EnlargedFit& fit) const {
+    return heldout_.leave_out(fit, partitions_);
+  }
+
+  /// Errors in both partitions, m/s², 2n an axis.
+  PerAxis<Eigen::VectorXd> errors_mps2(const EnlargedFit& fit) const {
+    const std::vector<LeftOut> parts = leave_out(fit);
+    PerAxis<Eigen::VectorXd> all;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      all[i].resize(parts[0].residual_V[i].size() + parts[1].residual_V[i].size());
+      all[i] << parts[0].residual_V[i], parts[1].residual_V[i];
+      all[i] *= fit.parameters.mps2_per_V(i);
+    }
+    return all;
+  }
+  double rms_mps2(const EnlargedFit& fit, std::size_t axis) const {
+    return rms(errors_mps2(fit)[axis]);
+  }
+
+  /// The model without one of its effects, and the share of the left-out excess that the effect
+  /// removes, of which `with` is what is left with it.
+  struct Without {
+    EnlargedFit fit;
+    double gain = 0;
+  };
+  Without without(std::size_t k, const std::vector<LeftOut>& with) const {
+    Without without{fit_enlarged(log_, found_.observed, found_.whitening,
+                                 without_effect(found_.fit.parameters, k))};
+    if (!without.fit.determined) return without;
+    // What changes within the dwell may hardly be seen in the means.
+    without.gain = std::max(
+        gain(leave_out(without.fit), with, axes_of(found_.fit.parameters.effects[k])),
+        heldout_dwell_gain(log_, found_.observed, found_.whitening, found_.fit, k, partitions_));
+    return without;
+  }
+
+ private:
+  /// Share of the excess held-out residual power that an effect removes.
+  static double gain(const std::vector<LeftOut>& without, const std::vector<LeftOut>& with,
+                     const std::vector<std::size_t>& axes) {
+    double power_without = 0, power_with = 0, expected = 0;
+    for (std::size_t part = 0; part < with.size(); ++part)
+      for (const std::size_t axis : axes) {
+        power_without += without[part].power[axis];
+        power_with += with[part].power[axis];
+        expected += static_cast<double>(with[part].residual_V[axis].size());
+      }
+    return share_removed(power_without, power_with, expected);
+  }
+
+  const VisitLog& log_;
+  const SearchResult& found_;
+  std::vector<Blocks> partitions_;
+  Heldout heldout_;
+};
+
+/// Effects that do not help where they were not fitted are no effects. Says which were dropped, one
+/// after the other, by their places in what was left of the model; `gains`: of those that stay.
+std::vector<std::size_t> drop_what_does_not_carry(const VisitLog& log, const Validation& validation,
+                                                  SearchResult& found, std::vector<double>& gains) {
+  std::vector<std::size_t> all_dropped;
+  for (bool dropped = true; dropped && !found.evidence.empty();) {
+    dropped = false;
+    gains.clear();
+    const std::vector<LeftOut> with = validation.leave_out(found.fit);
+    for (std::size_t k = 0; k < found.evidence.size(); ++k) {
+      const ActiveEffect& active = found.fit.parameters.effects[k];
+      Validation::Without without = validation.without(k, with);
+      // One pose's own error cannot be predicted from other poses.
+      const bool own =
+          active.effect->concerns_one_visit() || active.effect->certain(log, active.axis);
+      if (without.gain > 0 || own || !without.fit.determined) {
+        gains.push_back(std::max(without.gain, 0.0));
+        continue;
+      }
+      found.remove(k);
+      found.fit = std::move(without.fit);
+      all_dropped.push_back(k);
+      dropped = true;
+      break;
+    }
+  }
+  return all_dropped;
+}
+
+/// Effects with which the poses of an axis that were left out of the fit come out far worse than by
+/// the 12 parameters are none, however much more like noise they make the rest. Of those the one
+/// without which they come out best; nothing where none is.
+std::optional<std::size_t> what_worsens(const SearchInput& search, const Validation& validation,
+                                        const SearchResult& found,
+                                        const PerAxis<double>& before_mps2) {
+  constexpr double kFar = 2;  // slow noise alone may make it worse by a little
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (!(validation.rms_mps2(found.fit, axis) > kFar * before_mps2[axis])) continue;
+    std::optional<std::size_t> worst;
+    double least_mps2 = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < found.evidence.size(); ++k) {
+      const ActiveEffect& active = found.fit.parameters.effects[k];
+      if (active.effect->subject() != Subject::sensor || active.axis != axis ||
+          active.effect->certain(search.log, axis))
+        continue;
+      const EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening,
+                                               without_effect(found.fit.parameters, k));
+      const double left_mps2 = validation.rms_mps2(without, axis);
+      if (!worst || left_mps2 < least_mps2) {
+        least_mps2 = left_mps2;
+        worst = k;
+      }
+    }
+    if (worst) return worst;
+  }
+  return {};
+}
+
+void fit_anew(const SearchInput& search, const CandidateList& candidates, SearchResult& found) {
+  found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
+  found.responses =
+      candidate_responses(search.log, candidates, found.whitening, found.fit.parameters);
+}
+
+/// Searches; without what makes poses that are left out worse, again.
+void search_past_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
+                              const PerAxis<double>& before_mps2, const SearchOptions& options,
+                              ValidatedSearch& result) {
+  constexpr int kMostSearches = 3;
+  SearchResult& found = result.found;
+  for (int k = 1;; ++k) {
+    found = search_effects(search, result.candidates, options);
+    if (found.evidence.empty()) return;
+    const auto worst =
+        what_worsens(search, Validation(search.log, poses, found), found, before_mps2);
+    if (!worst) return;
+    const std::size_t family = found.evidence[*worst].candidate.family;
+    if (k == kMostSearches) break;
+    std::erase_if(result.candidates.candidates,
+                  [&](const Candidate& candidate) { return candidate.family == family; });
+  }
+  while (const auto worst =
+             what_worsens(search, Validation(search.log, poses, found), found, before_mps2)) {
+    found.remove(*worst);
+    fit_anew(search, result.candidates, found);
+  }
+}
+
+/// Leaves what carries over to poses that were left out.
+void keep_what_carries(const SearchInput& search, const std::vector<PoseMean>& poses,
+                       ValidatedSearch& result) {
+  SearchResult& found = result.found;
+  const Validation validation(search.log, poses, found);
+  std::vector<std::size_t> dropped;
+  if (result.codes) {
+    // Edges of the bits hide what carries over.
+    SearchResult& without = result.codes->before_converter;
+    dropped = drop_what_does_not_carry(*result.log, Validation(*result.log, poses, without),
+                                       without, result.gains);
+    drop_effects(search, dropped, found, *result.codes);
+    const std::vector<LeftOut> with = validation.leave_out(found.fit);
+    for (std::size_t k = result.gains.size(); k < found.evidence.size(); ++k)
+      result.gains.push_back(std::max(0.0, validation.without(k, with).gain));
+  } else {
+    dropped = drop_what_does_not_carry(search.log, validation, found, result.gains);
+  }
+  if (!dropped.empty())
+    found.responses =
+        candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
+  if (!found.evidence.empty()) result.heldout_mps2 = validation.errors_mps2(found.fit);
+}
+
+}  // namespace
+
+ValidatedSearch search_validated(const SearchInput& search, const CalibrationInput& measured,
+                                 const std::vector<PoseMean>& poses,
+                                 const PerAxis<double>& before_mps2,
+                                 const std::vector<std::shared_ptr<const Effect>>& own,
+                                 const SearchOptions& options) {
+  ValidatedSearch result;
+  if (auto beside_bits = search_beside_stuck_bits(
+          search, measured, design_matrix(poses, measured.description.gravity), own, options)) {
+    result.log = std::move(beside_bits->log);
+    result.candidates = std::move(beside_bits->candidates);
+    result.found = std::move(beside_bits->found);
+    result.codes = std::move(beside_bits->given_back);
+  } else {
+    result.candidates = all_candidates(search.log, own);
+    search_past_what_worsens(search, poses, before_mps2, options, result);
+  }
+  if (!result.found.evidence.empty()) keep_what_carries(search, poses, result);
+  return result;
+}
+
+}  // namespace plumbline
