@@ -130,6 +130,12 @@ class TermList {
     if (clock) clock_ = driver;
     if (driver->two_valued) {
       for (const Target& target : {kBias, kScale, kH}) add_polynomials(driver, target, {1});
+      // A play that the load takes up, which turns with the tilt.
+      for (const Pull pull : {Pull::cosine_of_h, Pull::sine_of_h}) {
+        Target target = kDelta;
+        target.pull = pull;
+        add_polynomials(driver, target, {1});
+      }
       return;
     }
     for (const Target& target : {kBias, kScale, kDelta, kH}) {
