@@ -72,7 +72,7 @@ TEST(Findings, SingleReadingsOfAnUndeclaredConverterProveNoStep) {
 
 TEST(Findings, AnUnlistedFunctionOfTheOwnAxisLeavesItsSensitivityAlone) {
   SyntheticOptions options;
-  options.more_x_V = [](const auto& a_g, double) {
+  options.more_V[0] = [](const auto& a_g, double) {
     return 5e-4 * std::legendre(5, a_g[0] / 1.001);
   };
   const SyntheticRun data = synthetic_run(4, kSixteenBits, options);
@@ -86,7 +86,7 @@ TEST(Findings, AnUnlistedFunctionOfTheOwnAxisLeavesItsSensitivityAlone) {
 
 SyntheticOptions something_happened_to_x() {
   SyntheticOptions options;
-  options.more_x_V = [](const auto&, double t_s) {
+  options.more_V[0] = [](const auto&, double t_s) {
     return 1e-3 * std::exp(-0.5 * std::pow((t_s - 150) / 9, 2));
   };
   return options;
@@ -103,7 +103,7 @@ TEST(Findings, WhatHappenedOnceIsNoSlowNoise) {
 TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
   // Pose 20 of 60 comes at 121 s and has 20 samples, 8 of them before the step.
   SyntheticOptions options;
-  options.more_x_V = [](const auto&, double t_s) { return t_s < 121.0749 ? 0 : 2e-3; };
+  options.more_V[0] = [](const auto&, double t_s) { return t_s < 121.0749 ? 0 : 2e-3; };
   const Calibration result = calibrated(synthetic_run(6, kSixteenBits, options));
   ASSERT_EQ(result.diagnosis.effects.size(), 1U) << result.diagnosis.reason;
   const FoundEffect& step = result.diagnosis.effects.front();
@@ -116,7 +116,7 @@ TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
 
 TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
   SyntheticOptions options;
-  options.more_x_V = [](const auto&, double t_s) {
+  options.more_V[0] = [](const auto&, double t_s) {
     return (t_s < 120 ? 0 : 2e-3) + (t_s < 180 ? 0 : 3e-3);
   };
   const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
@@ -151,8 +151,8 @@ MeasurementSet poses_of(const MeasurementSet& set, std::size_t first, std::size_
 TEST(Evaluate, TellsFromTheReadingsWhetherTheHeadWentElsewhere) {
   SyntheticOptions options;
   options.delta_step_deg = 20;
-  options.more_x_V = [before_g = 0.0, now_g = 0.0, arrival_s = 0.0](const auto& all_g,
-                                                                    double t_s) mutable {
+  options.more_V[0] = [before_g = 0.0, now_g = 0.0, arrival_s = 0.0](const auto& all_g,
+                                                                     double t_s) mutable {
     const double a_g = all_g[0];
     if (a_g != now_g) {
       before_g = now_g;

@@ -86,8 +86,8 @@ TEST(NoiseDrivers, NoiseThatFollowsNothingHasNoDriver) {
 // It passed for slow noise that the record, at rest and shorter, happened not to show: "clean".
 TEST(NoiseDrivers, ABiasThatWandersAsTheRecordNeverDidIsSaid) {
   SyntheticOptions options = fine_grid();
-  options.more_x_V = [random = std::mt19937_64(8), level_V = 0.0, next_s = 61.0](
-                         const auto&, double t_s) mutable {
+  options.more_V[0] = [random = std::mt19937_64(8), level_V = 0.0, next_s = 61.0](
+                          const auto&, double t_s) mutable {
     constexpr double kSize_V = 3e-4;
     if (t_s < next_s) return level_V;
     next_s += std::uniform_real_distribution<double>(5, 25)(random);
@@ -116,7 +116,7 @@ TEST(NoiseDrivers, ALimitExplainsItsQuietReadings) {
     const double response_g = (x[0] * a_g[0] + x[1] * a_g[1] + x[2] * a_g[2]) / x[0];
     return std::clamp(response_g, -kLimit_g, kLimit_g) - response_g;
   };
-  options.more_x_V = [x, clipped_g](const auto& a_g, double) { return x[0] * clipped_g(a_g); };
+  options.more_V[0] = [x, clipped_g](const auto& a_g, double) { return x[0] * clipped_g(a_g); };
   options.noise_x = [clipped_g](const auto& a_g, double) { return clipped_g(a_g) == 0 ? 1 : 0.2; };
   const Calibration result = calibration_of(synthetic_run(kSeed, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);

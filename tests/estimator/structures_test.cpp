@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <optional>
 
 #include "estimator/calibrate.h"
@@ -15,6 +16,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::Field;
 using testing::IsEmpty;
+using testing::SizeIs;
 
 struct Structure {
   const char* driver;
@@ -57,13 +59,13 @@ class AtPoseBefore {
 
 TEST(Structure, AnAxisThatWasStruckHasAnotherScaleFromThenOn) {
   SyntheticOptions options;
-  options.more_x_V = [](const auto& a_g, double t_s) { return t_s < 150 ? 0 : 1e-3 * a_g[0]; };
+  options.more_V[0] = [](const auto& a_g, double t_s) { return t_s < 150 ? 0 : 1e-3 * a_g[0]; };
   expect_only_structure(options, {"t_s", "scale", "step"});
 }
 
 TEST(Structure, AScaleThatWarmsUpDiesAway) {
   SyntheticOptions options;
-  options.more_x_V = [](const auto& a_g, double t_s) {
+  options.more_V[0] = [](const auto& a_g, double t_s) {
     return 6e-2 * std::exp(-t_s / 25) * a_g[0];
   };
   expect_only_structure(options, {"t_s", "scale", "exponential"});
@@ -78,7 +80,7 @@ TEST(Structure, ABaseThatWasPushedStandsCrookedFromThenOn) {
 // As a warm-up and a polynomial it ended with the run.
 TEST(Structure, WhatDiffusesGrowsWithTheRootOfTheTime) {
   SyntheticOptions options;
-  options.more_x_V = [](const auto&, double t_s) {
+  options.more_V[0] = [](const auto&, double t_s) {
     return t_s < 61 ? 0 : 5e-4 * std::sqrt(t_s - 61);
   };
   expect_only_structure(options, {"t_s", "bias", "power"});
@@ -88,13 +90,13 @@ TEST(Structure, WhatDiffusesGrowsWithTheRootOfTheTime) {
 TEST(Structure, AnEndThatIsReachedGraduallyIsAWideStep) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) { return 1e-3 * std::tanh(a_g[0] / 0.15); };
+  options.more_V[0] = [](const auto& a_g, double) { return 1e-3 * std::tanh(a_g[0] / 0.15); };
   expect_only_structure(options, {"a_x", "bias", "step"});
 }
 
 TEST(Structure, ProductsOfThreeComponentsAreNotDrivenByTheTime) {
   SyntheticOptions options;
-  options.more_x_V = [](const auto& a_g, double) { return 3e-3 * a_g[0] * a_g[1] * a_g[2]; };
+  options.more_V[0] = [](const auto& a_g, double) { return 3e-3 * a_g[0] * a_g[1] * a_g[2]; };
   expect_only_structure(options,
                         {"a_x", "scale",
                          "polynomial of degree 1, times the component of the next axis and "
@@ -105,7 +107,7 @@ TEST(Structure, ProductsOfThreeComponentsAreNotDrivenByTheTime) {
 TEST(Structure, AHighHarmonicOfTheSpindleIsOne) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) {
+  options.more_V[0] = [](const auto& a_g, double) {
     return 3e-4 * std::sin(7 * std::atan2(-a_g[1], a_g[0]) + 0.4);
   };
   expect_only_structure(options, {"delta_deg", "bias", "harmonic"});
@@ -115,7 +117,7 @@ TEST(Structure, AHighHarmonicOfTheSpindleIsOne) {
 TEST(Structure, AResonanceAtOneValueOfAComponentIsABell) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) {
+  options.more_V[0] = [](const auto& a_g, double) {
     return 1e-3 * std::exp(-0.5 * std::pow((a_g[0] - 0.35) / 0.06, 2));
   };
   expect_only_structure(options, {"a_x", "bias", "bell"});
@@ -124,7 +126,7 @@ TEST(Structure, AResonanceAtOneValueOfAComponentIsABell) {
 TEST(Structure, AGainThatFallsBeyondTheSameSizeOnBothSidesIsOneBend) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) {
+  options.more_V[0] = [](const auto& a_g, double) {
     const double beyond_g = std::max(0.0, std::abs(a_g[0]) - 0.6);
     return 3e-3 * std::copysign(beyond_g, a_g[0]);
   };
@@ -136,14 +138,14 @@ TEST(Structure, AProductOfThirdOrderIsThatAndNoBendInTime) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
   options.h_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) { return 2e-3 * a_g[0] * a_g[2] * a_g[2]; };
+  options.more_V[0] = [](const auto& a_g, double) { return 2e-3 * a_g[0] * a_g[2] * a_g[2]; };
   expect_only_structure(options, {"a_z", "scale", "square"});
 }
 
 TEST(Structure, WhatFallsBackAgainAndAgainIsASawTooth) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto&, double t_s) {
+  options.more_V[0] = [](const auto&, double t_s) {
     const double cycles = t_s / 97;
     return 5e-4 * (cycles - std::floor(cycles) - 0.5);
   };
@@ -194,7 +196,7 @@ TEST(Structure, WhatAPoseLeavesForGoodIsNoSettling) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+  options.more_V[0] = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
     return 1e-3 * (before(a_g[0], t_s) - a_g[0]);
   };
   expect_only_structure(
@@ -206,7 +208,7 @@ TEST(Structure, WhatDependsOnTheDirectionOfTheTurnIsNoPolynomialOfIt) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [last_rad = 0.0, way = 1.0](const auto& a_g, double) mutable {
+  options.more_V[0] = [last_rad = 0.0, way = 1.0](const auto& a_g, double) mutable {
     constexpr double kMoved_rad = 1e-6;
     const double to_rad = std::atan2(-a_g[1], a_g[0]);
     const double delta_rad = to_rad < -kMoved_rad ? to_rad + 2 * std::acos(-1.0) : to_rad;
@@ -226,7 +228,7 @@ TEST(Structure, WhatDependsOnTheWaySaysNothingOfTheFirstPose) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+  options.more_V[0] = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
     const double h_rad = std::atan2(a_g[2], std::hypot(a_g[0], a_g[1]));
     return 2e-3 * (h_rad - before(h_rad, t_s));
   };
@@ -240,7 +242,7 @@ TEST(Structure, ABiasThatJumpsBetweenTwoRingsFollowsTheComponent) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
   options.h_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) { return a_g[2] > 0.7 ? 8e-4 : 0.0; };
+  options.more_V[0] = [](const auto& a_g, double) { return a_g[2] > 0.7 ? 8e-4 : 0.0; };
   const UnlistedStructure found = expect_only_structure(options, {"a_z", "bias", "step"});
   EXPECT_THAT(found.alternatives, Contains("sensor.bias_step"));
   EXPECT_NE(found.separate_by, "");
@@ -251,7 +253,7 @@ TEST(Structure, ABellOverTwoRingsIsOne) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
   options.h_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double) {
+  options.more_V[0] = [](const auto& a_g, double) {
     return 1e-3 * std::exp(-0.5 * std::pow((a_g[2] - 0.42) / 0.1, 2));
   };
   expect_only_structure(options, {"a_z", "bias", "bell"});
@@ -261,14 +263,65 @@ TEST(Structure, ABellOverTwoRingsIsOne) {
 TEST(Structure, ABiasThatIsThereForAWhileIsAWindow) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto&, double t_s) { return t_s > 200 && t_s < 290 ? 6e-4 : 0.0; };
+  options.more_V[0] = [](const auto&, double t_s) { return t_s > 200 && t_s < 290 ? 6e-4 : 0.0; };
   expect_only_structure(options, {"t_s", "bias", "window"});
+}
+
+// As steps of the bias, of which the last stayed.
+TEST(Structure, AShockThatDiesAwayIsOneJump) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_V[0] = [](const auto&, double t_s) {
+    return t_s < 231 ? 0.0 : 1e-3 * std::exp((231 - t_s) / 80);
+  };
+  expect_only_structure(options, {"t_s", "bias", "jump that dies away"});
+}
+
+// One visit on the wrong side of a fall this large hides that all others are right.
+TEST(Structure, ALargeSawToothIsNoDriftWithSteps) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.more_V[1] = [](const auto&, double t_s) {
+    const double teeth = (t_s + 31) / 222;
+    return 1e-2 * (teeth - std::floor(teeth));
+  };
+  expect_only_structure(options, {"t_s", "bias", "saw tooth"});
+}
+
+/// Which way the spindle turned last, ±1.
+class DirectionOfTurn {
+ public:
+  double operator()(double delta_deg) {
+    if (delta_deg != at_deg_) direction_ = delta_deg > at_deg_ ? 1 : -1;
+    at_deg_ = delta_deg;
+    return direction_;
+  }
+
+ private:
+  double at_deg_ = 0, direction_ = 1;
+};
+
+TEST(Structure, APlayThatTheLoadTakesUpTurnsWithTheTilt) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 10;
+  options.delta_error_deg = [direction = DirectionOfTurn()](double delta_deg,
+                                                            double h_deg) mutable {
+    return 0.5 * direction(delta_deg) * std::sin(h_deg * std::numbers::pi / 180);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"previous_pose", "geometry",
+                                      "polynomial of degree 1 in the direction of the last turn of "
+                                      "delta within 360 degrees, times the sine of h, "
+                                      "added to delta"});
+  EXPECT_THAT(found.axes, SizeIs(3));
 }
 
 TEST(Structure, ACrossSensitivityThatJumpsIsAScale) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [](const auto& a_g, double t_s) { return t_s > 280 ? 2e-3 * a_g[1] : 0.0; };
+  options.more_V[0] = [](const auto& a_g, double t_s) { return t_s > 280 ? 2e-3 * a_g[1] : 0.0; };
   expect_only_structure(options, {"t_s", "scale", "step, times the component of the next axis"});
 }
 
@@ -276,7 +329,7 @@ TEST(Structure, WhatAnotherAxisFeltBeforeIsOneStraightLine) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+  options.more_V[0] = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
     return 1e-3 * before(a_g[1], t_s);
   };
   expect_only_structure(
@@ -320,7 +373,7 @@ class LastWay {
 TEST(Structure, WhatIsDrawnAgainstFrictionGoesNoFurtherThanItsReach) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [spring = SpringWithFriction(0.2)](const auto& a_g, double) mutable {
+  options.more_V[0] = [spring = SpringWithFriction(0.2)](const auto& a_g, double) mutable {
     return 1e-3 * spring(a_g[0]);
   };
   const UnlistedStructure found =
@@ -335,7 +388,7 @@ TEST(Structure, HysteresisOfAnotherAxisIsFrictionInItsComponent) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 20;
-  options.more_x_V = [way = LastWay()](const auto& a_g, double) mutable {
+  options.more_V[0] = [way = LastWay()](const auto& a_g, double) mutable {
     return 5e-4 * way(a_g[1]);
   };
   expect_only_structure(options,
@@ -346,7 +399,7 @@ TEST(Structure, HysteresisOfAnotherAxisIsFrictionInItsComponent) {
 TEST(Structure, ALoopLikeALeafIsHysteresisLessWhatTheSquareOfTheForceTakes) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
-  options.more_x_V = [way = LastWay()](const auto& a_g, double) mutable {
+  options.more_V[0] = [way = LastWay()](const auto& a_g, double) mutable {
     return 6e-4 * (1 - a_g[0] * a_g[0]) * way(a_g[0]);
   };
   const SyntheticRun data = synthetic_run(7, kSixteenBits, options);

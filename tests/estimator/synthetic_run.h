@@ -24,8 +24,8 @@ struct SyntheticOptions {
   int delta_step_deg = 30;
   int h_step_deg = 20;
   double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
-  /// Anything else that x does, V, of the specific force in g and the time in s.
-  std::function<double(const std::array<double, 3>&, double)> more_x_V = {};
+  /// Anything else that an axis does, V, of the specific force in g and the time in s.
+  PerAxis<std::function<double(const std::array<double, 3>&, double)>> more_V = {};
   std::function<double(double)> base_roll_rad = {};  ///< at a time in s
   /// By how much the noise of x is larger, of the specific force in g and the time since arrival in
   /// s.
@@ -78,7 +78,7 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
       const auto& row = result.truth[axis];
       double u_V = row[0] * a[0] + row[1] * a[1] + row[2] * a[2] + row[3];
       if (axis == 0) u_V += options.k2_x_V_per_g2 * a[0] * a[0];
-      if (axis == 0 && options.more_x_V) u_V += options.more_x_V(a, t_s);
+      if (options.more_V[axis]) u_V += options.more_V[axis](a, t_s);
       const bool noisy = axis == 0 && options.noise_x && moving;
       u_V += options.sigma_V * (noisy ? options.noise_x(a, t_s - arrival_s) : 1) * normal(random);
       table.u_V[axis].push_back(adc.min_V +

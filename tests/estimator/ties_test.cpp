@@ -27,8 +27,8 @@ SyntheticRun with_hysteresis(AtTie at_tie) {
   options.delta_step_deg = 10;
   options.h_step_deg = 10;
   options.random_order = true;
-  options.more_x_V = [=, last_g = 0.0, last_s = -10.0, sign = 1.0](const auto& all_g,
-                                                                   double t_s) mutable {
+  options.more_V[0] = [=, last_g = 0.0, last_s = -10.0, sign = 1.0](const auto& all_g,
+                                                                    double t_s) mutable {
     const double a_g = all_g[0];
     constexpr double kSame_g = 1e-9, kBetweenPoses_s = 1;
     if (t_s > last_s + kBetweenPoses_s)
@@ -90,8 +90,8 @@ TEST(Settling, KnowsThatTheHeadMayComeFromItsZero) {
   options.h_step_deg = 10;
   constexpr double kSettling_V_per_g = 1e-3, kTau_s = 0.1;
   const double gamma = 9.8101 / kStandardGravity_mps2;
-  options.more_x_V = [=, now_g = gamma, from_g = gamma, arrival_s = 0.0, last_s = 0.0](
-                         const auto& all_g, double t_s) mutable {
+  options.more_V[0] = [=, now_g = gamma, from_g = gamma, arrival_s = 0.0, last_s = 0.0](
+                          const auto& all_g, double t_s) mutable {
     constexpr double kBetweenPoses_s = 1;
     if (t_s > last_s + kBetweenPoses_s) {
       from_g = now_g;

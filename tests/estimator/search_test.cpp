@@ -1,0 +1,83 @@
+// What several effects together look like, and what the search makes of it.
+#include "estimator/diagnosis/search.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "estimator/calibrate.h"
+#include "tests/estimator/synthetic_run.h"
+
+namespace plumbline {
+namespace {
+
+using testing::Field;
+using testing::IsEmpty;
+using testing::SizeIs;
+using testing::UnorderedElementsAre;
+
+SyntheticOptions full_grid() {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  return options;
+}
+
+Calibration calibrated(const SyntheticOptions& options) {
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  return calibrate({data.run, &data.still, data.description}, {});
+}
+
+// Of opposite signs on x and y they turn the specific force like an ellipticity of delta.
+TEST(Search, ThreeCubicsAreNoErrorOfTheHead) {
+  SyntheticOptions options = full_grid();
+  const std::array<double, 3> k3_V_per_g3 = {5e-4, -5e-4, 4e-4};
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    options.more_V[i] = [i, k3 = k3_V_per_g3[i]](const auto& a_g, double) {
+      return k3 * std::pow(a_g[i], 3);
+    };
+  const Calibration result = calibrated(options);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  ASSERT_THAT(result.diagnosis.effects, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.effects.front().id, "sensor.cubic");
+  EXPECT_THAT(result.diagnosis.effects.front().axes, SizeIs(3));
+}
+
+// What varies while the base is tilted is not the tilt.
+TEST(Search, DriftsBesideATiltedBaseAreNoTiltThatFollowsTheTime) {
+  SyntheticOptions options = full_grid();
+  options.base_roll_rad = [](double) { return 0.02; };
+  const std::array<double, 3> drift_V_per_s = {4e-7, -3e-7, 3e-7};
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    options.more_V[i] = [drift = drift_V_per_s[i]](const auto&, double t_s) { return drift * t_s; };
+  const Calibration result = calibrated(options);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  EXPECT_THAT(result.diagnosis.effects,
+              UnorderedElementsAre(Field(&FoundEffect::id, "rig.base_roll"),
+                                   Field(&FoundEffect::id, "sensor.drift")));
+}
+
+// A polynomial of h holds the sine of h, but for the last digits: the sensitivity to z came out
+// five orders of magnitude too large, and poses beyond the highest tilt as much in error.
+TEST(Search, AFunctionOfTheTiltDoesNotTakeThePlaceOfASensitivity) {
+  SyntheticOptions options = full_grid();
+  options.sigma_V = 1e-5;
+  options.more_V[1] = [](const auto& a_g, double) {
+    const double h_deg = std::asin(std::min(a_g[2], 1.0)) * 180 / std::numbers::pi;
+    return 3e-3 * std::sin(2 * std::numbers::pi * h_deg / 35 + 0.7);
+  };
+  const SyntheticRun data = synthetic_run(7, kTwelveBits, options);
+  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_NEAR(result.final.batch_ls[1].value(2), data.truth[1][2], 3e-3);
+  EXPECT_LT(result.after.heldout_pose_rms_mps2[1], 0.5 * result.before.heldout_pose_rms_mps2[1]);
+}
+
+}  // namespace
+}  // namespace plumbline
