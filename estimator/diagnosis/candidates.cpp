@@ -310,15 +310,22 @@ CandidateResponses some_of(const CandidateResponses& responses,
   return some;
 }
 
-bool holds(const CandidateResponses& responses, std::size_t general, std::size_t special) {
+bool holds(const CandidateResponses& responses, const EnlargedFit& fit, std::size_t general,
+           std::size_t special) {
   constexpr double kLeft = 1e-6;  // of what it does
-  const CandidateResponses::Place &whole = responses.place[general],
-                                  &part = responses.place[special];
-  if (whole.group != part.group) return false;
-  const Eigen::MatrixXd& means = responses.groups[whole.group].means;
-  const Eigen::MatrixXd basis = orthonormal_basis(means.middleCols(whole.first, whole.count));
-  const Eigen::MatrixXd does = means.middleCols(part.first, part.count);
-  return (does - basis * (basis.transpose() * does)).norm() < kLeft * does.norm();
+  const CandidateResponses::Place& whole = responses.place[general];
+  const CandidateResponses::Place& part = responses.place[special];
+  if (whole.group != part.group || whole.count < part.count) return false;
+  const CandidateResponses::Group& group = responses.groups[whole.group];
+  const Eigen::Index twelve = fit.parameters.first_free(0);
+  Eigen::MatrixXd taken(group.means.rows(), twelve + whole.count);
+  taken << fit.whitened_jacobian.block(group.first_row, 0, group.means.rows(), twelve),
+      group.means.middleCols(whole.first, whole.count);
+  const auto left = [&](const Eigen::MatrixXd& basis) {
+    const Eigen::MatrixXd does = group.means.middleCols(part.first, part.count);
+    return (does - basis * (basis.transpose() * does)).norm();
+  };
+  return left(orthonormal_basis(taken)) < kLeft * left(orthonormal_basis(taken.leftCols(twelve)));
 }
 
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)

@@ -157,7 +157,7 @@ class Search {
       const double promised = first_order(static_cast<Eigen::Index>(c));
       if (!special.has_name() || model_.is_dropped(special) || model_.is_chosen(special) ||
           promised < kNearly * first_order(static_cast<Eigen::Index>(general)) ||
-          !holds(model_.responses(), general, c))
+          !holds(model_.responses(), model_.stage().fit, general, c))
         continue;
       const EnlargedFit with = model_.fit_with(gains, c, special, promised);
       if (!with.determined) continue;
