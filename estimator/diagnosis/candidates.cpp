@@ -14,6 +14,10 @@
 
 namespace plumbline {
 
+double looks_on_axes(const CandidateList& list, const Candidate& candidate) {
+  return kAxisCount * static_cast<double>(list.family_size[candidate.family]);
+}
+
 void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
                     double handicap) {
   const std::size_t axes = effect.subject() == Subject::head ? 1 : kAxisCount;

@@ -36,6 +36,9 @@ struct CandidateList {
   std::vector<std::shared_ptr<const Effect>> owned;
 };
 
+/// Independent looks where one effect is asked of the axes only: its hypotheses on each.
+double looks_on_axes(const CandidateList& list, const Candidate& candidate);
+
 /// Adds all hypotheses of one effect.
 void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
                     double handicap = 0);

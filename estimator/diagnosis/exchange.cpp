@@ -381,7 +381,8 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
     return c.effect == chosen.effect || !model.is_chosen(c);
   };
   const auto found = look_among_slow(model.input(), model.list(), stage, true,
-                                     {beside, axes, 1, model.false_alarm_of_slow(), is_open});
+                                     {beside, axes, 1, model.false_alarm_of_slow(), is_open,
+                                      [](const Candidate&) { return false; }});
   if (!found || !found->significant || found->candidate == model.index(k)) return false;
   const auto cost = [&](const EnlargedParameters& with, std::size_t candidate) {
     Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};

@@ -109,7 +109,11 @@ class Search {
         ranked.begin(), ranked.end(),
         [&](const Scored& a, const Scored& b) { return log_p_of_all(a) < log_p_of_all(b); });
     p_best_rest_ = model_.p_of(list_.candidates[surest->candidate], surest->log_p);
-    if (p_best_rest_ > options_.false_alarm) return false;
+    if (std::none_of(ranked.begin(), ranked.end(), [&](const Scored& s) {
+          const Candidate& c = list_.candidates[s.candidate];
+          return model_.p_of(c, s.log_p) <= model_.false_alarm(c);
+        }))
+      return false;
 
     // First order ranks; the full response decides.
     constexpr std::size_t kRefined = 10;
@@ -188,7 +192,8 @@ class Search {
     };
     const auto found =
         look_among_slow(input_, list_, model_.stage(), model_.noise_is_own(),
-                        {beside, axes, worth_a_look, model_.false_alarm_of_slow(), is_open});
+                        {beside, axes, worth_a_look, model_.false_alarm_of_slow(), is_open,
+                         [this](const Candidate& c) { return model_.is_on_another_axis(c); }});
     if (!found) return false;
     p_best_rest_ = std::min(p_best_rest_, found->p_value);
     return found->significant && model_.add({found->candidate, found->p_value, found->model});

@@ -18,6 +18,8 @@ struct SearchOptions {
   /// Nominal chance that noise alone makes the search claim an effect. Far below the 1 % wanted,
   /// because the noise itself is only estimated: slow drifts come out too significant.
   double false_alarm = 1e-4;
+  /// The same for an effect that another axis has already shown.
+  double false_alarm_on_another_axis = 1e-3;
   /// The same for a slow effect that is compared with the noise estimated anew under each
   /// hypothesis; on an axis whose converter is coarse, where what is left of rounding follows the
   /// positions and is slow when they are, less.

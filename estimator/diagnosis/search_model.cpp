@@ -95,15 +95,16 @@ bool SearchModel::is_dropped(const Candidate& candidate) const {
   return std::count(dropped_.begin(), dropped_.end(), candidate.family) > 0;
 }
 
+bool SearchModel::is_on_another_axis(const Candidate& candidate) const {
+  return candidate.effect->subject() == Subject::sensor &&
+         std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
+           const Candidate& chosen = list_.candidates[k];
+           return chosen.effect == candidate.effect && chosen.axis != candidate.axis;
+         });
+}
+
 double SearchModel::looks_of(const Candidate& candidate) const {
-  const bool on_another_axis =
-      candidate.effect->subject() == Subject::sensor &&
-      std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
-        const Candidate& chosen = list_.candidates[k];
-        return chosen.effect == candidate.effect && chosen.axis != candidate.axis;
-      });
-  const double hypotheses = kAxisCount * static_cast<double>(list_.family_size[candidate.family]);
-  return on_another_axis ? std::min(looks_, hypotheses) : looks_;
+  return is_on_another_axis(candidate) ? std::min(looks_, looks_on_axes(list_, candidate)) : looks_;
 }
 
 double SearchModel::p_of(const Candidate& candidate, double log_p_local) const {
@@ -117,10 +118,12 @@ bool SearchModel::shows_steps(std::size_t axis) const {
 
 double SearchModel::false_alarm(const Candidate& candidate) const {
   const bool of_head = candidate.effect->subject() == Subject::head;
+  const double usual =
+      is_on_another_axis(candidate) ? options_.false_alarm_on_another_axis : options_.false_alarm;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if ((of_head || axis == candidate.axis) && shows_steps(axis))
-      return std::min(options_.false_alarm, options_.false_alarm_at_steps);
-  return options_.false_alarm;
+      return std::min(usual, options_.false_alarm_at_steps);
+  return usual;
 }
 
 PerAxis<double> SearchModel::false_alarm_of_slow() const {

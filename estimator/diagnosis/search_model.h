@@ -38,7 +38,10 @@ class SearchModel {
   /// How many independent looks the search amounts to.
   double looks() const { return looks_; }
   void set_looks(double looks) { looks_ = looks; }
-  /// How many of them a candidate competes with: what one axis shows is asked of the others first.
+  /// Whether the model has the same effect on another axis: what one shows is asked of the others
+  /// first.
+  bool is_on_another_axis(const Candidate& candidate) const;
+  /// How many looks a candidate competes with.
   double looks_of(const Candidate& candidate) const;
   /// p-value of a candidate in the search as a whole.
   double p_of(const Candidate& candidate, double log_p_local) const;

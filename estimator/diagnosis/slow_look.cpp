@@ -156,6 +156,7 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
   const std::size_t unnamed = ranked.size() - named;
   const auto p_of_look = [&](double log_p, std::size_t candidate) {
     const Candidate& c = list.candidates[candidate];
+    if (look.is_on_another_axis(c)) return p_of_search(log_p, looks_on_axes(list, c));
     const std::size_t like_it = c.has_name() ? named : unnamed;
     return p_of_search(log_p, static_cast<double>(2 * like_it * list.family_size[c.family]));
   };

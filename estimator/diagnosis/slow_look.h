@@ -19,6 +19,7 @@ struct SlowLook {
   /// p-value of the look below which a candidate counts as significant, per axis.
   PerAxis<double> false_alarm;
   std::function<bool(const Candidate&)> is_open;  ///< whether a candidate may join the model
+  std::function<bool(const Candidate&)> is_on_another_axis;  ///< SearchModel's
 };
 
 /// The candidate that a look found, and what speaks for it.
