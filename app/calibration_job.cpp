@@ -36,13 +36,18 @@ Result<void> check_observable(const Observability& observability, const std::str
                           observability.rank, observability.unobservable));
 }
 
-/// An output that does not follow the acceleration has no input-referred error.
-Result<void> check_responsive(const TriadEstimate& estimate, const std::string& source) {
+/// An output that does not follow the acceleration has no input-referred error. One of which the
+/// model leaves little does follow it, however uncertain what is left makes the scale factor.
+Result<void> check_responsive(const Calibration& calibration, const std::string& source) {
+  constexpr double kLittle_mps2 = 0.5 * kStandardGravity_mps2;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const AxisEstimate& estimate = calibration.estimates.batch_ls[axis];
     const auto diagonal = static_cast<Eigen::Index>(axis);
-    const double scale = estimate[axis].value[diagonal];
-    const double u = std::sqrt(estimate[axis].covariance(diagonal, diagonal));
-    if (std::abs(scale) > kLeastSignificance * u) continue;
+    const double scale = estimate.value[diagonal];
+    const double u = std::sqrt(estimate.covariance(diagonal, diagonal));
+    if (std::abs(scale) > kLeastSignificance * u ||
+        calibration.before.fit_pose_rms_mps2[axis] < kLittle_mps2)
+      continue;
     return fail(
         ErrorCode::input,
         fmt::format("{}: output {} does not follow the acceleration (K_{}{} = {:.3g} ± {:.2g} "
@@ -203,7 +208,7 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
       !good) {
     return fail(good.error());
   }
-  if (auto good = check_responsive(calibration.estimates.batch_ls, job.source); !good) {
+  if (auto good = check_responsive(calibration, job.source); !good) {
     return fail(good.error());
   }
   if (!job.verification.poses.empty()) {

@@ -141,7 +141,7 @@ std::string parameter_text(const EffectParameter& parameter) {
     text += fmt::format("{:.0f}", parameter.value);  // a pose, a bit, an order
     text += before_unit(unit) + unit;
   } else {
-    text += significant(parameter.value, 6) + before_unit(unit) + unit;
+    text += chosen(parameter.value, 6) + before_unit(unit) + unit;
   }
   return text;
 }

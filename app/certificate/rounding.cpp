@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace plumbline::app {
@@ -44,6 +45,17 @@ std::string significant(double value, int digits) {
     return fmt::format("{}·10{}", mantissa, superscript(exponent));
   }
   return with_minus(fmt::format("{:.{}f}", value, std::max(0, digits - 1 - exponent)));
+}
+
+std::string chosen(double value, int digits) {
+  const std::string text = significant(value, digits);
+  const std::size_t factor = std::min(text.find("·"), text.size());
+  std::string mantissa = text.substr(0, factor);
+  if (mantissa.find('.') != std::string::npos) {
+    mantissa.erase(mantissa.find_last_not_of('0') + 1);
+    if (mantissa.back() == '.') mantissa.pop_back();
+  }
+  return mantissa + text.substr(factor);
 }
 
 RoundedResult round_result(double value, double expanded) {

@@ -24,5 +24,7 @@ std::string difference_beside(double difference, double expanded);
 
 /// `value` with so many significant digits, without exponent where it reads well.
 std::string significant(double value, int digits);
+/// The same without zeros at the end: of what was chosen, not measured.
+std::string chosen(double value, int digits);
 
 }  // namespace plumbline::app

@@ -314,22 +314,30 @@ CandidateResponses some_of(const CandidateResponses& responses,
   return some;
 }
 
-bool holds(const CandidateResponses& responses, const EnlargedFit& fit, std::size_t general,
-           std::size_t special) {
-  constexpr double kLeft = 1e-6;  // of what it does
+std::vector<std::size_t> special_cases(const CandidateResponses& responses, const EnlargedFit& fit,
+                                       std::size_t general) {
+  constexpr double kLeft = 1e-6;  // of what a candidate does
   const CandidateResponses::Place& whole = responses.place[general];
-  const CandidateResponses::Place& part = responses.place[special];
-  if (whole.group != part.group || whole.count < part.count) return false;
   const CandidateResponses::Group& group = responses.groups[whole.group];
   const Eigen::Index twelve = fit.parameters.first_free(0);
   Eigen::MatrixXd taken(group.means.rows(), twelve + whole.count);
   taken << fit.whitened_jacobian.block(group.first_row, 0, group.means.rows(), twelve),
       group.means.middleCols(whole.first, whole.count);
-  const auto left = [&](const Eigen::MatrixXd& basis) {
-    const Eigen::MatrixXd does = group.means.middleCols(part.first, part.count);
-    return (does - basis * (basis.transpose() * does)).norm();
+  const auto squares_beside = [&](const Eigen::MatrixXd& basis) -> Eigen::RowVectorXd {
+    return (group.means - basis * (basis.transpose() * group.means)).colwise().squaredNorm();
   };
-  return left(orthonormal_basis(taken)) < kLeft * left(orthonormal_basis(taken.leftCols(twelve)));
+  const Eigen::RowVectorXd beside_both = squares_beside(orthonormal_basis(taken));
+  const Eigen::RowVectorXd beside_twelve =
+      squares_beside(orthonormal_basis(taken.leftCols(twelve)));
+  std::vector<std::size_t> found;
+  for (std::size_t c = 0; c < responses.place.size(); ++c) {
+    const CandidateResponses::Place& part = responses.place[c];
+    if (c == general || part.group != whole.group) continue;
+    if (beside_both.segment(part.first, part.count).sum() <
+        kLeft * kLeft * beside_twelve.segment(part.first, part.count).sum())
+      found.push_back(c);
+  }
+  return found;
 }
 
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)

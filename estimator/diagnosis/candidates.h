@@ -84,10 +84,10 @@ CandidateResponses whitened(CandidateResponses responses_V, const VisitLog& log,
 CandidateResponses some_of(const CandidateResponses& responses,
                            const std::vector<std::size_t>& candidates);
 
-/// Whether everything that a candidate may do to the means beside the 12 parameters of a fit with
-/// the same whitening, to first order, another one (`general`) may do as well.
-bool holds(const CandidateResponses& responses, const EnlargedFit& fit, std::size_t general,
-           std::size_t special);
+/// The candidates that a more general one holds as special cases: whatever they may do to the means
+/// beside the 12 parameters of a fit with the same whitening, to first order, it may do as well.
+std::vector<std::size_t> special_cases(const CandidateResponses& responses, const EnlargedFit& fit,
+                                       std::size_t general);
 
 /// By how much each candidate would improve a fitted model, to first order.
 class CandidateGains {

@@ -315,33 +315,32 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
 
 /// What an effect without a name holds as special cases: a polynomial is made of terms that have
 /// names. All of them in its place; empty if they are not worth their price.
-std::vector<SearchModel::Entry> special_cases_of(const SearchModel& model, const Named& named,
+std::vector<SearchModel::Entry> parts_with_names(const SearchModel& model,
                                                  const CandidateResponses& responses,
                                                  std::size_t effect) {
   constexpr double kClearly = 2;
-  std::vector<SearchModel::Entry> cases;
+  std::vector<SearchModel::Entry> parts;
   const EnlargedFit without = model.fit_without({effect});
+  if (!without.determined) return parts;
   double cost = 0;
   EnlargedFit fit = without;
-  for (const std::size_t c : named.index) {
+  for (const std::size_t c : special_cases(responses, model.stage().fit, model.index(effect))) {
     const Candidate& special = model.list().candidates[c];
-    if (!fit.determined || model.is_chosen(special) ||
-        !holds(responses, model.stage().fit, model.index(effect), c))
-      continue;
+    if (!special.has_name() || model.is_chosen(special)) continue;
     EnlargedFit with = model.fit_with(fit.parameters, special.active());
     if (!with.determined) continue;
     cost += model.price_in(with, c);
-    cases.push_back({c, 1, with.parameters});
+    parts.push_back({c, 1, with.parameters});
     fit = std::move(with);
   }
   const double now = model.stage().fit.chi2 + model.price_of({effect});
-  if (cases.empty() || !(fit.chi2 + cost < now - kClearly)) return {};
+  if (parts.empty() || !(fit.chi2 + cost < now - kClearly)) return {};
   const double log_p = log_chi_squared_tail(
       without.chi2 - fit.chi2,
       static_cast<double>(fit.parameters.free_count() - without.parameters.free_count()));
-  for (SearchModel::Entry& entry : cases)
+  for (SearchModel::Entry& entry : parts)
     entry.p = model.p_of(model.list().candidates[entry.candidate], log_p);
-  return cases;
+  return parts;
 }
 
 }  // namespace
@@ -349,13 +348,13 @@ std::vector<SearchModel::Entry> special_cases_of(const SearchModel& model, const
 bool name_unlisted(SearchModel& model) {
   const std::vector<std::vector<std::size_t>> subsets = unlisted_of(model);
   if (subsets.empty()) return false;
-  const Named named = named_candidates(model);
   const CandidateResponses& responses = model.responses();
   for (std::size_t k = 0; k < model.size(); ++k) {
     if (model.candidate(k).has_name()) continue;
-    const std::vector<SearchModel::Entry> cases = special_cases_of(model, named, responses, k);
-    if (!cases.empty() && model.exchange({k}, cases)) return true;
+    const std::vector<SearchModel::Entry> parts = parts_with_names(model, responses, k);
+    if (!parts.empty() && model.exchange({k}, parts)) return true;
   }
+  const Named named = named_candidates(model);
   for (const auto& subset : subsets) {
     const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
     if (!names.empty() && model.exchange(subset, names)) return true;

@@ -98,16 +98,16 @@ class Search {
       return model_.is_dropped(c) || model_.is_chosen(c) ||
              (false_alarm < options_.false_alarm && model_.p_of(c, s.log_p) > false_alarm);
     });
-    const auto log_p_of_all = [&](const Scored& s) {
+    const auto log_p_in_search = [&](const Scored& s) {
       return s.log_p + std::log(model_.looks_of(list_.candidates[s.candidate]) / model_.looks());
     };
-    for (Scored& s : ranked) s.score += log_p_of_all(s) - s.log_p;
+    for (Scored& s : ranked) s.score += log_p_in_search(s) - s.log_p;
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const Scored& a, const Scored& b) { return a.score < b.score; });
     if (ranked.empty()) return false;
     const auto surest = std::min_element(
         ranked.begin(), ranked.end(),
-        [&](const Scored& a, const Scored& b) { return log_p_of_all(a) < log_p_of_all(b); });
+        [&](const Scored& a, const Scored& b) { return log_p_in_search(a) < log_p_in_search(b); });
     p_best_rest_ = model_.p_of(list_.candidates[surest->candidate], surest->log_p);
     if (std::none_of(ranked.begin(), ranked.end(), [&](const Scored& s) {
           const Candidate& c = list_.candidates[s.candidate];
@@ -156,12 +156,11 @@ class Search {
   bool add_special_case(std::size_t general, const CandidateGains& gains,
                         const Eigen::VectorXd& first_order) {
     constexpr double kNearly = 0.9;
-    for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
+    for (const std::size_t c : special_cases(model_.responses(), model_.stage().fit, general)) {
       const Candidate& special = list_.candidates[c];
       const double promised = first_order(static_cast<Eigen::Index>(c));
       if (!special.has_name() || model_.is_dropped(special) || model_.is_chosen(special) ||
-          promised < kNearly * first_order(static_cast<Eigen::Index>(general)) ||
-          !holds(model_.responses(), model_.stage().fit, general, c))
+          promised < kNearly * first_order(static_cast<Eigen::Index>(general)))
         continue;
       const EnlargedFit with = model_.fit_with(gains, c, special, promised);
       if (!with.determined) continue;

@@ -54,6 +54,14 @@ TEST(Rounding, SignificantDigits) {
   EXPECT_EQ(significant(0, 3), "0");
 }
 
+TEST(Rounding, WhatWasChosenHasNoZerosAtTheEnd) {
+  EXPECT_EQ(chosen(0.5, 6), "0.5");
+  EXPECT_EQ(chosen(120.25, 6), "120.25");
+  EXPECT_EQ(chosen(1200, 3), "1200");
+  EXPECT_EQ(chosen(2.5e-7, 6), "2.5·10⁻⁷");
+  EXPECT_EQ(chosen(-2, 6), "−2");
+}
+
 TEST(Rounding, DifferencesEndWhereTheyStopToMatter) {
   EXPECT_EQ(difference_beside(1.2e-14, 0.024), "0.00000");
   EXPECT_EQ(difference_beside(-0.00063, 0.11), "−0.0006");
