@@ -16,8 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 
-const Adc kTwelveBits{12, -5.0, 0.0};
-
 Calibration calibrated(const SyntheticRun& data) {
   return calibrate({data.run, &data.still, data.description}, {});
 }

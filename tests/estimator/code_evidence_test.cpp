@@ -195,8 +195,6 @@ TEST(CodeEvidence, LowestBitsAllClearAreACoarserStep) {
   EXPECT_NEAR(lattice->step_V, 8 * kSixteenBits.lsb_V(), 1e-6);
 }
 
-constexpr Adc kTwelveBits{12, -5, 0};
-
 // Poses all over 80 mV with little noise, each code as `fault` makes it.
 MeasurementSet poses_with(std::int64_t (*fault)(std::int64_t code)) {
   std::mt19937_64 random(7);

@@ -13,8 +13,8 @@
 
 namespace plumbline {
 
-/// A converter whose steps are fine against the noise.
-constexpr Adc kSixteenBits{16, -5.0, 0.0};
+/// A converter whose steps matter, and one whose steps are fine against the noise.
+constexpr Adc kTwelveBits{12, -5.0, 0.0}, kSixteenBits{16, -5.0, 0.0};
 
 struct SyntheticOptions {
   double sigma_V = 3e-4;  ///< of one sample
