@@ -15,6 +15,9 @@ namespace plumbline {
 
 namespace {
 
+/// By how much what takes another's place must be cheaper, in χ².
+constexpr double kClearly = 2;
+
 /// Sum of squares of a fit. What a candidate makes of the first visit is a guess, which counts
 /// neither for it nor for what it would replace.
 double chi2_beside(const SearchModel& model, const Candidate& candidate, const EnlargedFit& fit) {
@@ -55,7 +58,6 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const CandidateResponses& responses,
                                               const std::vector<std::size_t>& subset) {
   constexpr std::size_t kMostRefined = 4;
-  constexpr double kClearly = 2;
   std::vector<SearchModel::Entry> exchanges;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return exchanges;
@@ -161,7 +163,6 @@ std::vector<Kind> kinds_on_axes(const SearchModel& model, const CandidateGains& 
 std::vector<SearchModel::Entry> one_kind_for(const SearchModel& model,
                                              const CandidateResponses& responses,
                                              const std::vector<std::size_t>& subset) {
-  constexpr double kClearly = 2;
   std::vector<SearchModel::Entry> best;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return best;
@@ -292,7 +293,6 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
 /// their price.
 std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named& named,
                                           const std::vector<std::size_t>& subset) {
-  constexpr double kClearly = 2;
   const std::size_t most = subset.size() + 2;
   std::vector<SearchModel::Entry> names;
   std::size_t worth = 0;
@@ -318,7 +318,6 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
 std::vector<SearchModel::Entry> parts_with_names(const SearchModel& model,
                                                  const CandidateResponses& responses,
                                                  std::size_t effect) {
-  constexpr double kClearly = 2;
   std::vector<SearchModel::Entry> parts;
   const EnlargedFit without = model.fit_without({effect});
   if (!without.determined) return parts;
@@ -363,7 +362,6 @@ bool name_unlisted(SearchModel& model) {
 }
 
 bool exchange_slow(SearchModel& model, std::size_t k) {
-  constexpr double kClearly = 2;
   const Candidate& chosen = model.candidate(k);
   const std::size_t axis = chosen.axis;
   if (model.is_certain(chosen) || chosen.effect->subject() == Subject::head ||

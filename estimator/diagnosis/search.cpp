@@ -98,22 +98,20 @@ class Search {
       return model_.is_dropped(c) || model_.is_chosen(c) ||
              (false_alarm < options_.false_alarm && model_.p_of(c, s.log_p) > false_alarm);
     });
-    const auto log_p_in_search = [&](const Scored& s) {
-      return s.log_p + std::log(model_.looks_of(list_.candidates[s.candidate]) / model_.looks());
-    };
-    for (Scored& s : ranked) s.score += log_p_in_search(s) - s.log_p;
+    for (Scored& s : ranked)
+      s.score += std::log(model_.looks_of(list_.candidates[s.candidate]) / model_.looks());
     std::stable_sort(ranked.begin(), ranked.end(),
                      [](const Scored& a, const Scored& b) { return a.score < b.score; });
     if (ranked.empty()) return false;
-    const auto surest = std::min_element(
-        ranked.begin(), ranked.end(),
-        [&](const Scored& a, const Scored& b) { return log_p_in_search(a) < log_p_in_search(b); });
-    p_best_rest_ = model_.p_of(list_.candidates[surest->candidate], surest->log_p);
-    if (std::none_of(ranked.begin(), ranked.end(), [&](const Scored& s) {
-          const Candidate& c = list_.candidates[s.candidate];
-          return model_.p_of(c, s.log_p) <= model_.false_alarm(c);
-        }))
-      return false;
+    p_best_rest_ = 1;
+    bool any_significant = false;
+    for (const Scored& s : ranked) {
+      const Candidate& c = list_.candidates[s.candidate];
+      const double p = model_.p_of(c, s.log_p);
+      p_best_rest_ = std::min(p_best_rest_, p);
+      any_significant = any_significant || p <= model_.false_alarm(c);
+    }
+    if (!any_significant) return false;
 
     // First order ranks; the full response decides.
     constexpr std::size_t kRefined = 10;

@@ -41,6 +41,11 @@ class Validation {
     return rms(errors_mps2(fit)[axis]);
   }
 
+  EnlargedFit fit_without(std::size_t k) const {
+    return fit_enlarged(log_, found_.observed, found_.whitening,
+                        without_effect(found_.fit.parameters, k));
+  }
+
   /// The model without one of its effects, and the share of the left-out excess that the effect
   /// removes, of which `with` is what is left with it.
   struct Without {
@@ -48,8 +53,7 @@ class Validation {
     double gain = 0;
   };
   Without without(std::size_t k, const std::vector<LeftOut>& with) const {
-    Without without{fit_enlarged(log_, found_.observed, found_.whitening,
-                                 without_effect(found_.fit.parameters, k))};
+    Without without{fit_without(k)};
     if (!without.fit.determined) return without;
     // What changes within the dwell may hardly be seen in the means.
     without.gain = std::max(
@@ -110,10 +114,12 @@ std::vector<std::size_t> drop_what_does_not_carry(const VisitLog& log, const Val
 /// Effects with which the poses of an axis that were left out of the fit come out far worse than by
 /// the 12 parameters are none, however much more like noise they make the rest. Of those the one
 /// without which they come out best; nothing where none is.
-std::optional<std::size_t> what_worsens(const SearchInput& search, const Validation& validation,
+std::optional<std::size_t> what_worsens(const VisitLog& log, const std::vector<PoseMean>& poses,
                                         const SearchResult& found,
                                         const PerAxis<double>& before_mps2) {
   constexpr double kFar = 2;  // slow noise alone may make it worse by a little
+  if (found.evidence.empty()) return {};
+  const Validation validation(log, poses, found);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     if (!(validation.rms_mps2(found.fit, axis) > kFar * before_mps2[axis])) continue;
     std::optional<std::size_t> worst;
@@ -121,11 +127,9 @@ std::optional<std::size_t> what_worsens(const SearchInput& search, const Validat
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
       const ActiveEffect& active = found.fit.parameters.effects[k];
       if (active.effect->subject() != Subject::sensor || active.axis != axis ||
-          active.effect->certain(search.log, axis))
+          active.effect->certain(log, axis))
         continue;
-      const EnlargedFit without = fit_enlarged(search.log, found.observed, found.whitening,
-                                               without_effect(found.fit.parameters, k));
-      const double left_mps2 = validation.rms_mps2(without, axis);
+      const double left_mps2 = validation.rms_mps2(validation.fit_without(k), axis);
       if (!worst || left_mps2 < least_mps2) {
         least_mps2 = left_mps2;
         worst = k;
@@ -136,34 +140,29 @@ std::optional<std::size_t> what_worsens(const SearchInput& search, const Validat
   return {};
 }
 
-void fit_anew(const SearchInput& search, const CandidateList& candidates, SearchResult& found) {
-  found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
-  found.responses =
-      candidate_responses(search.log, candidates, found.whitening, found.fit.parameters);
-}
-
 /// Searches; without what makes poses that are left out worse, again.
 void search_past_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
                               const PerAxis<double>& before_mps2, const SearchOptions& options,
                               ValidatedSearch& result) {
   constexpr int kMostSearches = 3;
   SearchResult& found = result.found;
-  for (int k = 1;; ++k) {
+  std::optional<std::size_t> worst;
+  for (int k = 0; k < kMostSearches; ++k) {
+    if (worst)
+      std::erase_if(result.candidates.candidates,
+                    [family = found.evidence[*worst].candidate.family](const Candidate& candidate) {
+                      return candidate.family == family;
+                    });
     found = search_effects(search, result.candidates, options);
-    if (found.evidence.empty()) return;
-    const auto worst =
-        what_worsens(search, Validation(search.log, poses, found), found, before_mps2);
+    worst = what_worsens(search.log, poses, found, before_mps2);
     if (!worst) return;
-    const std::size_t family = found.evidence[*worst].candidate.family;
-    if (k == kMostSearches) break;
-    std::erase_if(result.candidates.candidates,
-                  [&](const Candidate& candidate) { return candidate.family == family; });
   }
-  while (const auto worst =
-             what_worsens(search, Validation(search.log, poses, found), found, before_mps2)) {
+  for (; worst; worst = what_worsens(search.log, poses, found, before_mps2)) {
     found.remove(*worst);
-    fit_anew(search, result.candidates, found);
+    found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
   }
+  found.responses =
+      candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
 }
 
 /// Leaves what carries over to poses that were left out.

@@ -1,6 +1,7 @@
 #include "estimator/effects/smooth_term.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -61,6 +62,14 @@ const Target kBias{TermForm::bias}, kScale{TermForm::scale};
 const Target kDelta{TermForm::geometry}, kH{TermForm::geometry, &HeadGeometry::h_rad};
 const Target kRoll{TermForm::geometry, &HeadGeometry::roll_rad};
 const Target kSkew{TermForm::geometry, &HeadGeometry::skew_rad};
+
+/// An angle that follows the load as it turns with the tilt.
+std::array<Target, 2> pulled(const Target& angle) {
+  Target by_cosine = angle, by_sine = angle;
+  by_cosine.pull = Pull::cosine_of_h;
+  by_sine.pull = Pull::sine_of_h;
+  return {by_cosine, by_sine};
+}
 
 /// The terms of a log, gathered driver by driver.
 class TermList {
@@ -131,11 +140,7 @@ class TermList {
     if (driver->two_valued) {
       for (const Target& target : {kBias, kScale, kH}) add_polynomials(driver, target, {1});
       // A play that the load takes up, which turns with the tilt.
-      for (const Pull pull : {Pull::cosine_of_h, Pull::sine_of_h}) {
-        Target target = kDelta;
-        target.pull = pull;
-        add_polynomials(driver, target, {1});
-      }
+      for (const Target& target : pulled(kDelta)) add_polynomials(driver, target, {1});
       return;
     }
     for (const Target& target : {kBias, kScale, kDelta, kH}) {
@@ -232,11 +237,7 @@ class TermList {
     constexpr int kFirstUnlisted = 18;
     add(harmonic(delta, kDelta, kFirstUnlisted));
     for (const Target& angle : {kDelta, kH})
-      for (const Pull pull : {Pull::cosine_of_h, Pull::sine_of_h}) {
-        Target target = angle;
-        target.pull = pull;
-        add(harmonic(delta, target, 1));
-      }
+      for (const Target& target : pulled(angle)) add(harmonic(delta, target, 1));
   }
   /// Where the visits' positions are not the only thing that a pattern over them follows.
   void add_of_two() {

@@ -16,10 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 
-Calibration calibrated(const SyntheticRun& data) {
-  return calibrate({data.run, &data.still, data.description}, {});
-}
-
 TEST(Calibrate, FindsTheUnitAndItsNoise) {
   const SyntheticRun data = synthetic_run(1, kSixteenBits);
   const Calibration result = calibrated(data);
@@ -173,7 +169,7 @@ TEST(Calibrate, DwellsMayDifferInLength) {
   options.varied_dwells = true;
   for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     const SyntheticRun data = synthetic_run(seed, kSixteenBits, options);
-    const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+    const Calibration result = calibrated(data);
     EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
   }
 }
@@ -278,14 +274,14 @@ TEST(Coverage, TwelveBitsWithNoiseOfHalfAStep) {
 
 TEST(Calibrate, StaticRecordWithGapsIsUsedUpToThem) {
   SyntheticRun data = synthetic_run(8, kSixteenBits);
-  const Calibration whole = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration whole = calibrated(data);
   // 10 s and 40 s of record, 600 s between them; meanwhile the level has moved.
   for (std::size_t i = 1000; i < data.still.size(); ++i) {
     data.still.t_s[i] += 600;
     for (auto& axis : data.still.u_V) axis[i] += 0.01;
   }
   for (double& t_s : data.run.samples.t_s) t_s += 600;
-  const Calibration parted = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration parted = calibrated(data);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     EXPECT_THAT(parted.noise[axis].remark, testing::HasSubstr("1 gaps"));
     EXPECT_THAT(whole.noise[axis].remark, testing::Not(testing::HasSubstr("gaps")));

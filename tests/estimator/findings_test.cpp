@@ -23,10 +23,6 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-Calibration calibrated(const SyntheticRun& data, const CalibrationOptions& options = {}) {
-  return calibrate({data.run, &data.still, data.description}, options);
-}
-
 const DetectionLimit* limit_of(const Calibration& result, const std::string& id,
                                std::optional<std::size_t> axis, const std::string& parameter) {
   for (const DetectionLimit& limit : result.diagnosis.not_found)

@@ -20,10 +20,6 @@ SyntheticOptions fine_grid() {
   return options;
 }
 
-Calibration calibration_of(const SyntheticRun& data) {
-  return calibrate({data.run, &data.still, data.description}, {});
-}
-
 void expect_noise_of_x(const Calibration& result, const char* driver, const char* shape,
                        double ratio) {
   SCOPED_TRACE(result.diagnosis.reason);
@@ -45,7 +41,7 @@ TEST(NoiseDrivers, NoiseThatGrowsWithWhatTheAxisFeels) {
   SyntheticOptions options = fine_grid();
   options.noise_x = [](const auto& a_g, double) { return std::exp(0.7 * std::abs(a_g[0])); };
   const SyntheticRun data = synthetic_run(3, kSixteenBits, options);
-  const Calibration result = calibration_of(data);
+  const Calibration result = calibrated(data);
   expect_noise_of_x(result, "a_x", "noise, straight line in its size", std::exp(0.7));
   // It is in no mean, so another set lacks nothing of the model.
   EXPECT_THAT(evaluate(certified_model(result), data.run, data.description).left_out, IsEmpty());
@@ -54,7 +50,7 @@ TEST(NoiseDrivers, NoiseThatGrowsWithWhatTheAxisFeels) {
 TEST(NoiseDrivers, NoiseThatEveryArrivalBringsAlong) {
   SyntheticOptions options = fine_grid();
   options.noise_x = [](const auto&, double since_s) { return since_s < 0.05 ? 2 : 1; };
-  expect_noise_of_x(calibration_of(synthetic_run(4, kSixteenBits, options)), "t_in_pose",
+  expect_noise_of_x(calibrated(synthetic_run(4, kSixteenBits, options)), "t_in_pose",
                     "noise, first quarter against the rest", 2);
 }
 
@@ -65,7 +61,7 @@ TEST(NoiseDrivers, QuietPosesCountForMore) {
   double square = 0, expected = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     const SyntheticRun data = synthetic_run(seed, kSixteenBits, options);
-    const AxisEstimate x = calibration_of(data).estimates.batch_ls[0];
+    const AxisEstimate x = calibrated(data).estimates.batch_ls[0];
     for (Eigen::Index k = 0; k < 4; ++k) {
       square +=
           std::pow(x.value(k) - data.truth[0][static_cast<std::size_t>(k)], 2) / x.covariance(k, k);
@@ -78,7 +74,7 @@ TEST(NoiseDrivers, QuietPosesCountForMore) {
 
 TEST(NoiseDrivers, NoiseThatFollowsNothingHasNoDriver) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-    const Calibration result = calibration_of(synthetic_run(seed, kSixteenBits));
+    const Calibration result = calibrated(synthetic_run(seed, kSixteenBits));
     EXPECT_THAT(result.diagnosis.unlisted, IsEmpty()) << seed << result.diagnosis.reason;
   }
 }
@@ -94,7 +90,7 @@ TEST(NoiseDrivers, ABiasThatWandersAsTheRecordNeverDidIsSaid) {
     level_V = std::normal_distribution<double>(0, kSize_V)(random);
     return level_V;
   };
-  const Calibration result = calibration_of(synthetic_run(6, kSixteenBits, options));
+  const Calibration result = calibrated(synthetic_run(6, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_EQ(result.diagnosis.verdict, Verdict::partly_explained);
   ASSERT_FALSE(result.diagnosis.unlisted.empty());
@@ -118,7 +114,7 @@ TEST(NoiseDrivers, ALimitExplainsItsQuietReadings) {
   };
   options.more_V[0] = [x, clipped_g](const auto& a_g, double) { return x[0] * clipped_g(a_g); };
   options.noise_x = [clipped_g](const auto& a_g, double) { return clipped_g(a_g) == 0 ? 1 : 0.2; };
-  const Calibration result = calibration_of(synthetic_run(kSeed, kSixteenBits, options));
+  const Calibration result = calibrated(synthetic_run(kSeed, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);
   ASSERT_EQ(result.diagnosis.effects.size(), 1U);
   EXPECT_EQ(result.diagnosis.effects[0].id, "sensor.saturation");

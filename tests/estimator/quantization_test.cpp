@@ -318,7 +318,7 @@ TEST(Calibrate, UsesTheCodesWhereStepsAreCoarseAndSaysSo) {
 TEST(Uncertainty, MonteCarloAgreesWithTheLawOfPropagation) {
   SyntheticRun data = synthetic_run(4, kSixteenBits);
   data.description.angles = {20, 20};
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   ASSERT_TRUE(result.uncertainty);
   const UncertaintyReport& report = *result.uncertainty;
   EXPECT_TRUE(report.stabilised);
@@ -337,7 +337,7 @@ TEST(Uncertainty, MonteCarloAgreesWithTheLawOfPropagation) {
   }
   // Positioning seen along an axis that it does not touch to first order leaves a bias of second
   // order; the same seed gives the same report.
-  const Calibration again = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration again = calibrated(data);
   EXPECT_EQ(again.uncertainty->parameter[0][0].mc_low, report.parameter[0][0].mc_low);
 }
 

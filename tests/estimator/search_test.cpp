@@ -27,11 +27,6 @@ SyntheticOptions full_grid() {
   return options;
 }
 
-Calibration calibrated(const SyntheticOptions& options) {
-  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  return calibrate({data.run, &data.still, data.description}, {});
-}
-
 // Of opposite signs on x and y they turn the specific force like an ellipticity of delta.
 TEST(Search, ThreeCubicsAreNoErrorOfTheHead) {
   SyntheticOptions options = full_grid();
@@ -40,7 +35,7 @@ TEST(Search, ThreeCubicsAreNoErrorOfTheHead) {
     options.more_V[i] = [i, k3 = k3_V_per_g3[i]](const auto& a_g, double) {
       return k3 * std::pow(a_g[i], 3);
     };
-  const Calibration result = calibrated(options);
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
   ASSERT_THAT(result.diagnosis.effects, SizeIs(1));
@@ -55,7 +50,7 @@ TEST(Search, DriftsBesideATiltedBaseAreNoTiltThatFollowsTheTime) {
   const std::array<double, 3> drift_V_per_s = {4e-7, -3e-7, 3e-7};
   for (std::size_t i = 0; i < kAxisCount; ++i)
     options.more_V[i] = [drift = drift_V_per_s[i]](const auto&, double t_s) { return drift * t_s; };
-  const Calibration result = calibrated(options);
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
   EXPECT_THAT(result.diagnosis.effects,
@@ -73,7 +68,7 @@ TEST(Search, AFunctionOfTheTiltDoesNotTakeThePlaceOfASensitivity) {
     return 3e-3 * std::sin(2 * std::numbers::pi * h_deg / 35 + 0.7);
   };
   const SyntheticRun data = synthetic_run(7, kTwelveBits, options);
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_NEAR(result.final.batch_ls[1].value(2), data.truth[1][2], 3e-3);
   EXPECT_LT(result.after.heldout_pose_rms_mps2[1], 0.5 * result.before.heldout_pose_rms_mps2[1]);

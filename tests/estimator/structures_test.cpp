@@ -27,7 +27,7 @@ struct Structure {
 UnlistedStructure expect_only_structure(const SyntheticOptions& options,
                                         const Structure& expected) {
   const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_THAT(result.diagnosis.effects, IsEmpty());
   EXPECT_EQ(result.diagnosis.unlisted.size(), 1U);
@@ -289,26 +289,26 @@ TEST(Structure, ALargeSawToothIsNoDriftWithSteps) {
   expect_only_structure(options, {"t_s", "bias", "saw tooth"});
 }
 
-/// Which way the spindle turned last, ±1.
-class DirectionOfTurn {
+/// The way a value moved last: 1 up, −1 down.
+class LastWay {
  public:
-  double operator()(double delta_deg) {
-    if (delta_deg != at_deg_) direction_ = delta_deg > at_deg_ ? 1 : -1;
-    at_deg_ = delta_deg;
-    return direction_;
+  double operator()(double now) {
+    constexpr double kMoved = 1e-9;
+    if (std::abs(now - at_) > kMoved) way_ = now > at_ ? 1 : -1;
+    at_ = now;
+    return way_;
   }
 
  private:
-  double at_deg_ = 0, direction_ = 1;
+  double at_ = 0, way_ = 0;
 };
 
 TEST(Structure, APlayThatTheLoadTakesUpTurnsWithTheTilt) {
   SyntheticOptions options;
   options.random_order = true;
   options.delta_step_deg = 10;
-  options.delta_error_deg = [direction = DirectionOfTurn()](double delta_deg,
-                                                            double h_deg) mutable {
-    return 0.5 * direction(delta_deg) * std::sin(h_deg * std::numbers::pi / 180);
+  options.delta_error_deg = [way = LastWay()](double delta_deg, double h_deg) mutable {
+    return 0.5 * way(delta_deg) * std::sin(h_deg * std::numbers::pi / 180);
   };
   const UnlistedStructure found =
       expect_only_structure(options, {"previous_pose", "geometry",
@@ -355,20 +355,6 @@ class SpringWithFriction {
   std::optional<double> at_g_;
 };
 
-/// The way a value moved last: 1 up, −1 down.
-class LastWay {
- public:
-  double operator()(double now) {
-    constexpr double kMoved = 1e-9;
-    if (std::abs(now - at_) > kMoved) way_ = now > at_ ? 1 : -1;
-    at_ = now;
-    return way_;
-  }
-
- private:
-  double at_ = 0, way_ = 0;
-};
-
 // Of small moves in rings the head learns what large ones do: a polynomial of the move would not.
 TEST(Structure, WhatIsDrawnAgainstFrictionGoesNoFurtherThanItsReach) {
   SyntheticOptions options;
@@ -403,7 +389,7 @@ TEST(Structure, ALoopLikeALeafIsHysteresisLessWhatTheSquareOfTheForceTakes) {
     return 6e-4 * (1 - a_g[0] * a_g[0]) * way(a_g[0]);
   };
   const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   EXPECT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.hysteresis")));
   ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
   EXPECT_EQ(result.diagnosis.unlisted[0].shape,

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/calibrate.h"
 #include "estimator/measurement.h"
 
 namespace plumbline {
@@ -104,6 +105,10 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
     t_s += 3;
   }
   return result;
+}
+
+inline Calibration calibrated(const SyntheticRun& data, const CalibrationOptions& options = {}) {
+  return calibrate({data.run, &data.still, data.description}, options);
 }
 
 }  // namespace plumbline

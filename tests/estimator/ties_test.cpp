@@ -41,7 +41,7 @@ SyntheticRun with_hysteresis(AtTie at_tie) {
 }
 
 void expect_hysteresis_alone(const SyntheticRun& data) {
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.hysteresis")));
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
   const EffectParameter& w = result.diagnosis.effects[0].parameters[0];
@@ -73,7 +73,7 @@ TEST(Hysteresis, OfAForceThatNeverFallsShowsInTheFirstRing) {
   for (const Pose& pose : data.run.poses)
     for (std::size_t k = 0; k < pose.count; ++k)
       if (pose.h_deg > 0) data.run.samples.u_V[2][pose.first + k] += half_width_V;
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.hysteresis")));
   const FoundEffect& found = result.diagnosis.effects[0];
   EXPECT_THAT(found.alternatives, IsSupersetOf({"adc.code_step", "sensor.bias_step"}));
@@ -102,7 +102,7 @@ TEST(Settling, KnowsThatTheHeadMayComeFromItsZero) {
     return kSettling_V_per_g * (from_g - now_g) * std::exp(-(t_s - arrival_s) / kTau_s);
   };
   const SyntheticRun data = synthetic_run(3, kSixteenBits, options);
-  const Calibration result = calibrate({data.run, &data.still, data.description}, {});
+  const Calibration result = calibrated(data);
   ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.settling")));
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
   const auto& p = result.diagnosis.effects[0].parameters;
