@@ -1,4 +1,5 @@
 #include <cmath>
+#include <complex>
 #include <numbers>
 
 #include "estimator/effects/effect.h"
@@ -43,8 +44,16 @@ class MainsPickup final : public Effect {
   }
   bool within_dwell() const override { return true; }
   Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
-    const Eigen::ArrayXd since_s = effect::since_arrival_s(input.at());
-    return p[0] * (phase_rad(input.at(), p) + effect::kTurn_rad * p[1] * since_s).sin().matrix();
+    // Turned on from sample to sample: sines one by one would be a quarter of a search's time.
+    const Visit& visit = input.at();
+    const std::complex<double> turn = std::polar(1.0, effect::kTurn_rad * p[1] * visit.step_s);
+    std::complex<double> phasor = std::polar(1.0, phase_rad(visit, p));
+    Eigen::VectorXd course_g(static_cast<Eigen::Index>(visit.count));
+    for (double& value_g : course_g) {
+      value_g = p[0] * phasor.imag();
+      phasor *= turn;
+    }
+    return course_g;
   }
 
  private:
