@@ -99,7 +99,7 @@ double noise_degrees_of_freedom(const NoisePool& pool, const PooledNoise& noise,
     slope(static_cast<Eigen::Index>(i)) =
         taken.cwiseProduct(pool.processes().unit[static_cast<std::size_t>(free[i])]).sum() /
         functions;
-  const double variance = propagated_variance(pool.information_of(noise.power, P, free), slope);
+  const double variance = propagated_variance(pool.information_of(noise, P, free), slope);
   return variance > 0 ? 2 / variance : 1e9;
 }
 

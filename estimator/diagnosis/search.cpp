@@ -141,12 +141,38 @@ class Search {
         winner_log_p = log_p;
       }
     }
-    if (winner == nullptr) return replace_overlapping(ranked, gains);
+    std::vector<std::size_t> overlapping;  // and likelier than the winner
+    for (std::size_t k = 0; k < fits.size(); ++k)
+      if (!fits[k].determined && (winner == nullptr || ranked[k].score < winner->score))
+        overlapping.push_back(ranked[k].candidate);
+    if (replace_overlapping(overlapping, gains)) return true;
+    if (winner == nullptr) return false;
     const Candidate& won = list_.candidates[winner->candidate];
     const double p = model_.p_of(won, winner_log_p);
     if (p > model_.false_alarm(won)) return false;
+    if (!model_.noise_is_own() &&
+        !stands_beside_slow_noise(won, with_winner, gains.dof(winner->candidate)))
+      return model_.take_own_noise() && add_one();
     if (!won.has_name() && add_special_case(winner->candidate, gains, first_order)) return true;
     return model_.add({winner->candidate, p, with_winner});
+  }
+
+  /// Whether the readings are clearly likelier with the newcomer where it is slow and what it does
+  /// may as well be slow noise, of which noise that was estimated beside more has too little.
+  bool stands_beside_slow_noise(const Candidate& newcomer, const EnlargedParameters& with,
+                                int dof) const {
+    if (newcomer.effect->subject() == Subject::head ||
+        !is_slow(input_, with, with.effects.size() - 1, any_course_of_time(input_.log)))
+      return true;
+    const Stage& stage = model_.stage();
+    Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};
+    before.known[newcomer.axis] = nullptr;
+    const auto deviance = [&](const EnlargedParameters& parameters) {
+      return settle_noise(input_, parameters, before).noise[newcomer.axis].likelihood_deviance;
+    };
+    const double gain = deviance(stage.fit.parameters) - deviance(with);
+    return model_.p_of(newcomer, log_chi_squared_tail(std::max(0.0, gain), dof)) <=
+           model_.false_alarm(newcomer);
   }
 
   /// Where a term without a name holds one with a name as a special case that does nearly as much,
@@ -198,14 +224,17 @@ class Search {
 
   /// A term that holds one of the model's effects as a special case cannot stand beside it: it
   /// takes its place.
-  bool replace_overlapping(const std::vector<Scored>& ranked, const CandidateGains& gains) {
-    for (std::size_t r = 0; r < std::min<std::size_t>(3, ranked.size()); ++r) {
-      const std::size_t candidate = ranked[r].candidate;
+  bool replace_overlapping(const std::vector<std::size_t>& candidates,
+                           const CandidateGains& gains) {
+    constexpr std::size_t kMost = 3;
+    for (std::size_t c = 0; c < std::min(kMost, candidates.size()); ++c) {
+      const std::size_t candidate = candidates[c];
       for (std::size_t k = 0; k < model_.size(); ++k) {
-        const EnlargedFit without = model_.fit_without({k});
-        const EnlargedFit with =
-            model_.fit_with(without.parameters, list_.candidates[candidate].active());
-        if (!with.determined) continue;
+        const EnlargedFit with = model_.fit_with(without_effect(model_.stage().fit.parameters, k),
+                                                 list_.candidates[candidate].active());
+        if (!with.determined || with.chi2 + model_.price_in(with, candidate) >
+                                    model_.stage().fit.chi2 + model_.price_of({k}))
+          continue;
         const Candidate& newcomer = list_.candidates[candidate];
         const double p = model_.p_of(
             newcomer, model_.log_p_of(candidate, model_.stage().fit, with, gains.dof(candidate)));

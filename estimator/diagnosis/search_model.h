@@ -85,6 +85,9 @@ class SearchModel {
   bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
   /// What a newcomer has made superfluous goes.
   void drop_superfluous();
+  /// Noise that was estimated beside more than the model is estimated beside it alone; false if
+  /// that cannot be.
+  bool take_own_noise() { return adopt(stage_.fit.parameters); }
 
   /// All but p_best_rest. Leaves nothing here.
   SearchResult take_result();

@@ -224,6 +224,49 @@ FeasibleLine feasible_line(const std::vector<double>& x, const std::vector<doubl
   return result;
 }
 
+/// Codes, ascending, on the points of a lattice.
+struct LatticeFit {
+  bool good = false;  ///< all within `tolerance`
+  double middle = 0;  ///< of their distances from the points, the first of which is the first code
+  double spread = 0;
+};
+LatticeFit lattice_fit(std::span<const std::int64_t> codes, double step, double tolerance) {
+  // The lowest code lies up to half a declared step off its point. Where the lattice leaves
+  // little room beside that, the remainders would wrap unless they are centred.
+  const int shifts = static_cast<int>(std::ceil(1 / (step - tolerance)));
+  for (int k = 0; k < shifts; ++k) {
+    const double shift = (k + 0.5) / shifts - 0.5;
+    double low = step, high = -step;
+    for (const std::int64_t code : codes) {
+      const double off = std::remainder(static_cast<double>(code - codes.front()) - shift, step);
+      low = std::min(low, off);
+      high = std::max(high, off);
+      if (high - low > tolerance) break;
+    }
+    if (high - low <= tolerance) return {true, shift + 0.5 * (low + high), high - low};
+  }
+  return {};
+}
+
+double range_of(std::span<const std::int64_t> codes) {
+  return static_cast<double>(codes.back() - codes.front());
+}
+
+/// The codes that lie closest together, of more and more of them.
+std::vector<std::span<const std::int64_t>> closest_codes(const std::vector<std::int64_t>& codes) {
+  constexpr std::size_t kFewest = 64, kRatio = 4;
+  std::vector<std::span<const std::int64_t>> all;
+  for (std::size_t count = kFewest; count < codes.size() / 2; count *= kRatio) {
+    std::span<const std::int64_t> closest(codes.data(), count);
+    for (std::size_t first = 1; first + count <= codes.size(); ++first) {
+      const std::span<const std::int64_t> next(codes.data() + first, count);
+      if (range_of(next) < range_of(closest)) closest = next;
+    }
+    all.push_back(closest);
+  }
+  return all;
+}
+
 }  // namespace
 
 std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, const Adc& adc,
@@ -231,32 +274,23 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   constexpr double kFinest = 1.15, kCoarsest = 128;  // of the declared step
   if (codes.size() < 5) return {};
   // In declared steps from the lowest code. Rounding twice leaves half a step either way.
-  const double range = static_cast<double>(codes.back() - codes.front());
-  const double tolerance = 1.05;
+  const double range = range_of(codes);
+  constexpr double kTolerance = 1.05;
   const double resolution = 0.15 / range;
-  struct Fit {
-    bool good = false;
-    double middle = 0;  // of the remainders
-    double spread = 0;
-  };
   const auto fit = [&](double step) {
     // Between its points a lattice leaves codes out.
-    if (static_cast<double>(codes.size()) > range / step + 2) return Fit{};
-    // The lowest code lies up to half a declared step off its point. Where the lattice leaves
-    // little room beside that, the remainders would wrap unless they are centred.
-    const int shifts = static_cast<int>(std::ceil(1 / (step - tolerance)));
-    for (int k = 0; k < shifts; ++k) {
-      const double shift = (k + 0.5) / shifts - 0.5;
-      double low = step, high = -step;
-      for (const std::int64_t code : codes) {
-        const double off = std::remainder(static_cast<double>(code - codes.front()) - shift, step);
-        low = std::min(low, off);
-        high = std::max(high, off);
-        if (high - low > tolerance) break;
-      }
-      if (high - low <= tolerance) return Fit{true, shift + 0.5 * (low + high), high - low};
-    }
-    return Fit{};
+    if (static_cast<double>(codes.size()) > range / step + 2) return LatticeFit{};
+    return lattice_fit(codes, step, kTolerance);
+  };
+  const std::vector<std::span<const std::int64_t>> close_codes = closest_codes(codes);
+  // Codes that lie close together rule out many steps at once: a step shorter by a share of that
+  // over their range moves the points among them by no more than kMoves.
+  const auto steps_ruled_out = [&](double step) -> double {
+    constexpr double kMoves = 0.05;
+    for (const auto& close : close_codes)
+      if (!lattice_fit(close, step, kTolerance + kMoves).good)
+        return std::max(1.0, std::floor(kMoves / range_of(close) / (resolution / 3)));
+    return 0;
   };
   /// Neighbouring steps that fit.
   struct Steps {
@@ -266,18 +300,19 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   const auto steps_below = [&](double& tried, double finest) {
     Steps steps;
     while (tried > finest) {
-      const bool good = fit(tried).good;
+      const double ruled_out = steps_ruled_out(tried);
+      const bool good = ruled_out == 0 && fit(tried).good;
       if (!good && steps.first > 0) break;
       if (good) {
         if (steps.first == 0) steps.first = tried;
         steps.last = tried;
       }
-      tried *= 1 - resolution / 3;
+      tried *= std::pow(1 - resolution / 3, std::max(1.0, ruled_out));
     }
-    steps.least_spread = tolerance;
+    steps.least_spread = kTolerance;
     constexpr int kCloser = 64;
     for (int k = 0; k <= kCloser && steps.first > 0; ++k) {
-      const Fit closer = fit(steps.first + (steps.last - steps.first) * k / kCloser);
+      const LatticeFit closer = fit(steps.first + (steps.last - steps.first) * k / kCloser);
       if (closer.good) steps.least_spread = std::min(steps.least_spread, closer.spread);
     }
     return steps;
@@ -308,7 +343,7 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   if (log_chance > std::log(chance)) return {};
   const double lsb_V = adc.lsb_V(),
                front_V = adc.min_V + lsb_V * static_cast<double>(codes.front());
-  const Fit middle = fit(step);
+  const LatticeFit middle = fit(step);
   std::vector<double> points_seen, steps_seen;
   for (const std::int64_t code : codes) {
     steps_seen.push_back(static_cast<double>(code - codes.front()));

@@ -44,7 +44,9 @@ class Polynomial final : public DrivenTerm {
   }
   double at(double value, const double* p) const override {
     const double constant = first_degree() == 0 ? p[2] : 0;
-    return constant + legendre_series(value, p[0], p[1], p + 3 - first_degree(), degree_);
+    // A law of nature goes on; what a run did in its course need not.
+    const double curved = variable().is_clock() ? 0 : 1;
+    return constant + legendre_series(value, p[0], p[1], p + 3 - first_degree(), degree_, curved);
   }
   int first_degree() const {
     const bool clock_or_record = variable().recorded || variable().is_clock();
@@ -311,10 +313,12 @@ double Target::factor_at(const Visit& visit) const {
   return 1;
 }
 
-double legendre_series(double value, double low, double high, const double* c, int degree) {
+double legendre_series(double value, double low, double high, const double* c, int degree,
+                       double curved) {
   constexpr int kContinued = 2;  // the end slope of a higher degree is too uncertain
   const double position = (2 * value - low - high) / (high - low);
-  const double x = std::clamp(position, -1.0, 1.0);
+  const double reach = degree == kContinued ? 1 + curved : 1;
+  const double x = std::clamp(position, -reach, reach);
   // Bonnet's recursion.
   double before = 1, now = x, sum = c[0] * x;
   for (int d = 2; d <= degree; ++d) {

@@ -32,9 +32,11 @@ struct Target {
   double factor_at(const Visit& visit) const;
 };
 
-/// Σ c_d·P_d, d = 1 … degree, of the range from low to high; beyond it straight on up to degree 2,
-/// and held above that.
-double legendre_series(double value, double low, double high, const double* c, int degree);
+/// Σ c_d·P_d, d = 1 … degree, of the range from low to high. Beyond it degree 1 goes straight on,
+/// degree 2 as a parabola as far as `curved`, in half-ranges, and then straight on; higher degrees
+/// are held.
+double legendre_series(double value, double low, double high, const double* c, int degree,
+                       double curved = 0);
 
 /// Numbers of cycles in the range of a driver: least, least + step … most.
 struct Cycles {

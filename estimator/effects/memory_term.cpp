@@ -35,10 +35,12 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
     const Visit& visit = log.visits[k];
     const double dwell_s = visit.step_s * static_cast<double>(visit.count);
     if (k > 0) {
-      const double kept = std::exp(-(visit.t_arrival_s - end_s) / tau_s);
-      const double meanwhile =
-          between == InBetween::evenly ? std::midpoint(value[k - 1], value[k]) : value[k - 1];
-      state = meanwhile + kept * (state - meanwhile);
+      const double gap_s = visit.t_arrival_s - end_s;
+      // Behind what changes evenly an average lags by what that changes in a time constant.
+      const double lag =
+          between == InBetween::evenly && gap_s > 0 ? tau_s / gap_s * (value[k] - value[k - 1]) : 0;
+      const double left = std::exp(-gap_s / tau_s) * (state - value[k - 1] + lag);
+      state = (between == InBetween::evenly ? value[k] : value[k - 1]) - lag + left;
       if (between == InBetween::with_the_head && log.is_rest(k)) state = value[k];
     }
     average[k] =

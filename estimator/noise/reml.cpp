@@ -18,6 +18,8 @@ namespace plumbline {
 namespace {
 
 constexpr double kMarkovRatio = 4;  // of neighbouring correlation times
+// By so much, of −2 ln L, must record and run be likelier with slow noise of their own each.
+constexpr double kPriceOfApart = 8;
 
 /// Looks at the lower triangle only.
 bool has_diagonal_only(const Eigen::MatrixXd& covariance) {
@@ -39,6 +41,15 @@ Eigen::MatrixXd about_mean_of_run(const Eigen::MatrixXd& covariance) {
   result.rowwise() -= with_mean.transpose();
   result.array() += 2 * of_mean;
   return result;
+}
+
+/// Those that change over the run rather than from visit to visit.
+std::vector<Eigen::Index> walks(const NoiseProcesses& processes) {
+  constexpr Eigen::Index kSlowest = 2;  // Gauss-Markov processes
+  std::vector<Eigen::Index> all = {kTermK};
+  for (Eigen::Index m = 0; m < std::min(kSlowest, std::ssize(processes.decay_per_s)); ++m)
+    all.push_back(NoiseProcesses::kFirstMarkov + m);
+  return all;
 }
 
 }  // namespace
@@ -105,6 +116,8 @@ struct NoisePool::Point {
   double likelihood_deviance = 0;
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
+  /// Of χ², what the run shows of each process and what its power makes expect.
+  Eigen::VectorXd seen, expected;
 };
 
 /// Where a search ended.
@@ -127,12 +140,13 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
   // nearest of them. One that remembers for longer than the record lasts looks like a walk there.
   const auto& descriptions = model.descriptions;
   const auto bins = std::ssize(descriptions.front().bins);
-  densities_.resize(bins, processes.count());
+  Eigen::MatrixXd& densities = record_.shared;
+  densities.resize(bins, processes.count());
   const auto density = [&](std::size_t description, Eigen::Index bin) -> const Eigen::Vector4d& {
     return descriptions[description].bins[static_cast<std::size_t>(bin)].density;
   };
   for (Eigen::Index bin = 0; bin < bins; ++bin)
-    densities_.row(bin).head<NoiseProcesses::kFirstMarkov>() = density(0, bin).transpose();
+    densities.row(bin).head<NoiseProcesses::kFirstMarkov>() = density(0, bin).transpose();
   for (std::size_t m = 0; m < processes.decay_per_s.size(); ++m) {
     std::size_t nearest = 0;
     double distance = std::log(2.0);  // beyond the slowest by more than this: a walk
@@ -153,10 +167,25 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
                      : square(descriptions[nearest].walk_decay_per_s / processes.decay_per_s[m]);
     for (Eigen::Index bin = 0; bin < bins; ++bin) {
       const double same_rate = density(nearest, bin)(kTermK);
-      densities_(bin, column) =
+      densities(bin, column) =
           std::min(level * same_rate, density(0, bin)(kTermK));  // no process exceeds the walk
     }
   }
+  record_.own.resize(bins);
+  for (Eigen::Index bin = 0; bin < bins; ++bin)
+    record_.own(bin) = descriptions.front().bins[static_cast<std::size_t>(bin)].known;
+  record_apart_ = with_slow_noise_of_its_own(record_);
+}
+
+NoisePool::Record NoisePool::with_slow_noise_of_its_own(const Record& record) const {
+  const Climb alone = climb(starting_powers(), free_powers(),
+                            [&](const Eigen::VectorXd& power) { return record_at(power, record); });
+  Record apart = record;
+  for (const Eigen::Index i : walks(*processes_)) {
+    apart.own += record.shared.col(i) * alone.top.power(i);
+    apart.shared.col(i).setZero();
+  }
+  return apart;
 }
 
 Eigen::MatrixXd NoisePool::lower_covariance(const Eigen::VectorXd& power) const {
@@ -183,14 +212,13 @@ Eigen::MatrixXd NoisePool::covariance(const Eigen::VectorXd& power) const {
   return sum;
 }
 
-NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power) const {
+NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power, const Record& record) const {
   const Eigen::Index count = processes_->count();
-  Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
-  if (densities_.size() == 0) return point;
+  Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count),
+              {},    {}};
+  if (record.shared.size() == 0) return point;
   const std::vector<SpectrumBin>& bins = model_.descriptions.front().bins;
-  Eigen::VectorXd variance = densities_ * power;
-  for (Eigen::Index j = 0; j < variance.size(); ++j)
-    variance(j) += bins[static_cast<std::size_t>(j)].known;
+  const Eigen::VectorXd variance = record.shared * power + record.own;
   // The straight line is profiled out; what is left of it gives back one degree of freedom.
   double cross = 0, ramp = 0;
   for (Eigen::Index j = 0; j < variance.size(); ++j) {
@@ -213,35 +241,38 @@ NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power) const {
     single(j) = bin.ramp * inverse;
     excess(j) = inverse * (square_left + slope_variance * bin.ramp - bin.count * variance(j));
   }
-  const Eigen::VectorXd once = densities_.transpose() * single;
+  const Eigen::MatrixXd& shared = record.shared;
+  const Eigen::VectorXd once = shared.transpose() * single;
   const Eigen::MatrixXd normal =
-      densities_.transpose() * (weight - 2 * slope_variance * mixed).asDiagonal() * densities_ +
+      shared.transpose() * (weight - 2 * slope_variance * mixed).asDiagonal() * shared +
       square(slope_variance) * once * once.transpose();
   point.normal += normal;
-  point.right += densities_.transpose() * excess + normal * power;
+  point.right += shared.transpose() * excess + normal * power;
   return point;
 }
 
 NoisePool::Point NoisePool::evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
-                                     const Eigen::MatrixXd& design) const {
+                                     const Eigen::MatrixXd& design, const Record& record) const {
   const Projector projector = make_projector(lower_covariance(power), design);
   const Eigen::VectorXd py = projector.P * mean;
-  Point point = scoring_step(power, projector.P, py);
+  Point point = scoring_step(power, projector.P, py, record);
   point.deviance += projector.log_determinant + mean.dot(py);
   point.likelihood_deviance = point.deviance - projector.log_determinant_of_design;
   return point;
 }
 
 NoisePool::Point NoisePool::scoring_step(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
-                                         const Eigen::VectorXd& py) const {
-  Point point = record_at(power);
+                                         const Eigen::VectorXd& py, const Record& record) const {
+  Point point = record_at(power, record);
   // The average information (Gilmour, Thompson & Cullis, 1995) has the expected one's mean and
   // costs products with vectors only.
   const Seen seen = see(P, py);
-  const Eigen::VectorXd score = seen.unit_times_py.transpose() * py - seen.trace;
+  const Eigen::VectorXd square = seen.unit_times_py.transpose() * py;
   const Eigen::MatrixXd normal = seen.unit_times_py.transpose() * (P * seen.unit_times_py);
   point.normal += normal;
-  point.right += normal * power + score;
+  point.right += normal * power + square - seen.trace;
+  point.seen = power.cwiseProduct(square);
+  point.expected = power.cwiseProduct(seen.trace);
   return point;
 }
 
@@ -266,7 +297,7 @@ NoisePool::Seen NoisePool::see(const Eigen::MatrixXd& P, const Eigen::VectorXd& 
   return seen;
 }
 
-Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
+Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise, const Eigen::MatrixXd& P,
                                           const std::vector<Eigen::Index>& wanted) const {
   std::vector<Eigen::MatrixXd> seen;
   for (const Eigen::Index i : wanted) {
@@ -277,7 +308,8 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
     else
       seen.emplace_back(P * unit);
   }
-  Eigen::MatrixXd information = record_at(power).normal(wanted, wanted);
+  Eigen::MatrixXd information =
+      record_at(noise.power, record(noise.record_apart)).normal(wanted, wanted);
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
@@ -291,7 +323,7 @@ Eigen::MatrixXd NoisePool::information_of(const Eigen::VectorXd& power, const Ei
 EstimatedPowers NoisePool::estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
                                      const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
-  Point point = scoring_step(found.power, P, P * mean);
+  Point point = scoring_step(found.power, P, P * mean, record(found.record_apart));
   if (!quantization_is_free()) {
     point.normal.row(kTermQ).setZero();
     point.normal.col(kTermQ).setZero();
@@ -323,7 +355,26 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
   if (!free[kTermQ]) first(kTermQ) = 0;
   // Powers that were found to be zero need a little to find the way back.
   if (start != nullptr) first = start->cwiseMax(0.02 * first);
-  return climb(first, free, mean, design);
+  const Climb shared = climb(first, free, mean, design, false);
+  // Of χ²: with less missing in the run, nothing pays the price.
+  constexpr double kMissing = 2;
+  double missing = 0;
+  for (const Eigen::Index i : walks(*processes_))
+    missing += shared.top.expected(i) - shared.top.seen(i);
+  if (record_.shared.size() == 0 || missing < kMissing) return pooled(shared, false);
+  const PooledNoise apart = pooled(climb(shared.top.power, free, mean, design, true), true);
+  const bool is_apart = apart.deviance < shared.top.deviance &&
+                        walk_variance_V2(apart.power) < walk_variance_V2(shared.top.power);
+  return is_apart ? apart : pooled(shared, false);
+}
+
+double NoisePool::walk_variance_V2(const Eigen::VectorXd& power) const {
+  double sum_V2 = 0;
+  for (const Eigen::Index i : walks(*processes_)) {
+    const Eigen::MatrixXd& unit = processes_->unit[static_cast<std::size_t>(i)];
+    sum_V2 += power(i) * (unit.diagonal().mean() - unit.mean());
+  }
+  return sum_V2;
 }
 
 double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::VectorXd& mean,
@@ -334,7 +385,8 @@ double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::Vect
   std::vector<bool> free(static_cast<std::size_t>(first.size()), false);
   free[kTermQ] = quantization_is_free();
   free[kTermN] = true;
-  return climb(first, free, mean, design).deviance - found.deviance;
+  return pooled(climb(first, free, mean, design, found.record_apart), found.record_apart).deviance -
+         found.deviance;
 }
 
 template <typename Evaluate>
@@ -366,20 +418,31 @@ NoisePool::Climb NoisePool::climb(const Eigen::VectorXd& first, const std::vecto
   return climb;
 }
 
-PooledNoise NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
-                             const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const {
-  const Climb found = climb(
-      first, free, [&](const Eigen::VectorXd& power) { return evaluate(power, mean, design); });
-  return {found.top.power, covariance(found.top.power), found.top.deviance,
-          found.top.likelihood_deviance, found.converged};
+NoisePool::Climb NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+                                  const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+                                  bool record_apart) const {
+  return climb(first, free, [&](const Eigen::VectorXd& power) {
+    return evaluate(power, mean, design, record(record_apart));
+  });
+}
+
+PooledNoise NoisePool::pooled(const Climb& climb, bool record_apart) const {
+  const double price = record_apart ? kPriceOfApart : 0;
+  return {climb.top.power,
+          covariance(climb.top.power),
+          climb.top.deviance + price,
+          climb.top.likelihood_deviance + price,
+          climb.converged,
+          record_apart};
 }
 
 std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
                                                       const Eigen::VectorXd& mean,
                                                       const Eigen::MatrixXd& design) const {
-  if (densities_.size() == 0) return std::nullopt;
-  const Climb of_record = climb(starting_powers(), free_powers(),
-                                [&](const Eigen::VectorXd& power) { return record_at(power); });
+  if (record_.shared.size() == 0) return std::nullopt;
+  const Climb of_record =
+      climb(starting_powers(), free_powers(),
+            [&](const Eigen::VectorXd& power) { return record_at(power, record_); });
   const PooledNoise of_run =
       NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);
   return Contradiction{both.deviance - of_record.top.deviance - of_run.deviance,
@@ -389,9 +452,13 @@ std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
 PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
                           const Eigen::MatrixXd& design) const {
   const Projector projector = make_projector(lower_covariance(power), design);
-  const double deviance =
-      record_at(power).deviance + projector.log_determinant + mean.dot(projector.P * mean);
-  return {power, covariance(power), deviance, deviance - projector.log_determinant_of_design, true};
+  const double of_run = projector.log_determinant + mean.dot(projector.P * mean);
+  const double shared = record_at(power, record_).deviance;
+  const double apart = record_at(power, record_apart_).deviance + kPriceOfApart;
+  const bool is_apart = record_.shared.size() > 0 && apart < shared;
+  const double deviance = of_run + (is_apart ? apart : shared);
+  return {power, covariance(power), deviance, deviance - projector.log_determinant_of_design,
+          true,  is_apart};
 }
 
 NoiseModel without_record(NoiseModel model) {

@@ -33,6 +33,8 @@ struct PooledNoise {
   /// −2 ln of the full likelihood at these powers but for a constant: comparable between designs.
   double likelihood_deviance = 0;
   bool converged = false;
+  /// The record's slow noise is not the run's: it has powers of its own, and no say in these.
+  bool record_apart = false;
 };
 
 /// Powers that were estimated, and what is known of them. Empty where nothing was estimated.
@@ -52,7 +54,9 @@ struct Contradiction {
 /// means y = design·β + noise, β free, times the likelihood of the record that `model` came from.
 /// A record that determines white noise well pins it; the slow processes, which a record shorter
 /// than the run barely determines, move. The ramp of the record is not carried on: over the run a
-/// slow drift is told by the run itself.
+/// slow drift is told by the run itself. A record that saw what the run did not, or what the run's
+/// model explains, would make the run's slow noise too large: where the run has clearly less of it,
+/// the record keeps its own.
 class NoisePool {
  public:
   /// extra_variance: n further known variances (positioning, rounding), or empty. `processes` must
@@ -71,9 +75,9 @@ class NoisePool {
   /// covariance_of_powers() of that.
   EstimatedPowers estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
                             const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
-  /// Expected information of both sources about the `wanted` powers, the others held, where the
-  /// powers are `power` and P is the projector of their Σ and of the design.
-  Eigen::MatrixXd information_of(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
+  /// Expected information of both sources about the `wanted` powers of `noise`, the others held; P
+  /// is the projector of their Σ and of the design.
+  Eigen::MatrixXd information_of(const PooledNoise& noise, const Eigen::MatrixXd& P,
                                  const std::vector<Eigen::Index>& wanted) const;
   /// Whether the record and the run can be of one noise; nothing without a record. `both`: what
   /// pool() found for this mean and design.
@@ -87,19 +91,27 @@ class NoisePool {
   struct Point;
   struct Climb;
   struct Seen;
+  /// Densities in the record's bins: of its own, and bins × processes those that it shares with the
+  /// run; empty without a record.
+  struct Record {
+    Eigen::VectorXd own;
+    Eigen::MatrixXd shared;
+  };
+  const Record& record(bool apart) const { return apart ? record_apart_ : record_; }
   /// The record's restricted likelihood and its derivatives; zero without a record.
-  Point record_at(const Eigen::VectorXd& power) const;
+  Point record_at(const Eigen::VectorXd& power, const Record& record) const;
+  Record with_slow_noise_of_its_own(const Record& record) const;
   Eigen::MatrixXd lower_covariance(const Eigen::VectorXd& power) const;
   Seen see(const Eigen::MatrixXd& P, const Eigen::VectorXd& py) const;
   /// `normal` and `right` of both sources; P is the projector of the powers' Σ and of the design.
   Point scoring_step(const Eigen::VectorXd& power, const Eigen::MatrixXd& P,
-                     const Eigen::VectorXd& py) const;
+                     const Eigen::VectorXd& py, const Record& record) const;
   Point evaluate(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
-                 const Eigen::MatrixXd& design) const;
+                 const Eigen::MatrixXd& design, const Record& record) const;
   Eigen::VectorXd starting_powers() const;
   /// The window means cannot tell quantization from white noise: without a record it stays at zero.
   bool quantization_is_free() const {
-    return densities_.size() > 0 && densities_.col(kTermQ).sum() > 0;
+    return record_.shared.size() > 0 && record_.shared.col(kTermQ).sum() > 0;
   }
   /// All but that.
   std::vector<bool> free_powers() const {
@@ -116,15 +128,18 @@ class NoisePool {
   template <typename Evaluate>
   Climb climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
               const Evaluate& evaluate) const;
-  /// pool() from there.
-  PooledNoise climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
-                    const Eigen::VectorXd& mean, const Eigen::MatrixXd& design) const;
+  /// pool() from there, with the record together with the run or apart.
+  Climb climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
+              const Eigen::VectorXd& mean, const Eigen::MatrixXd& design, bool record_apart) const;
+  PooledNoise pooled(const Climb& climb, bool record_apart) const;
+  /// Variance over the run that the walks among these powers make.
+  double walk_variance_V2(const Eigen::VectorXd& power) const;
 
   const NoiseProcesses* processes_;
   NoiseModel model_;
-  bool own_noise_ = false;     ///< extra variance makes Σ regular without white noise
-  Eigen::VectorXd known_V2_;   ///< extra variance
-  Eigen::MatrixXd densities_;  ///< of the record's bins, bins × processes; empty without a record
+  bool own_noise_ = false;    ///< extra variance makes Σ regular without white noise
+  Eigen::VectorXd known_V2_;  ///< extra variance
+  Record record_, record_apart_;
 };
 
 /// A model that knows nothing of the noise but leaves all of it to the run.

@@ -76,6 +76,29 @@ TEST(CodeEvidence, AStepThatIsHardlyCoarserIsMeasured) {
   }
 }
 
+// Ten million codes are in reach of one axis, and readings of a few hundred dwells on some of them.
+TEST(CodeEvidence, ACoarserStepIsMeasuredAmongTheCodesOfAFineConverter) {
+  const Adc declared{24, -5.0, 0.0};
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> level_V(-4, -1);
+  std::normal_distribution<double> noise_V(0, 5e-5);
+  for (const double step_V : {1.1e-6, 6.2e-6, 2.9e-5}) {  // 3.7, 20.8 and 97 declared steps
+    std::vector<double> u_V;
+    for (int dwell = 0; dwell < 300; ++dwell) {
+      const double at_V = level_V(random);
+      for (int m = 0; m < 10; ++m)
+        u_V.push_back(rounded(-2.6 + std::round((at_V + noise_V(random) + 2.6) / step_V) * step_V,
+                              declared.lsb_V()));
+    }
+    const auto lattice = coarser_lattice(codes_seen(u_V, declared), declared);
+    ASSERT_TRUE(lattice) << step_V;
+    EXPECT_NEAR(lattice->step_V, step_V, 1e-6 * step_V);
+  }
+  std::vector<double> sound_V;
+  for (int k = 0; k < 3000; ++k) sound_V.push_back(rounded(level_V(random), declared.lsb_V()));
+  EXPECT_FALSE(coarser_lattice(codes_seen(sound_V, declared), declared));
+}
+
 // All lattices that give these codes are equally likely: the true one lies among them, as far off
 // as is stated.
 TEST(CodeEvidence, StepAndOriginAreKnownAsWellAsIsStated) {

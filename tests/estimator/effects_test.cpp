@@ -361,6 +361,21 @@ TEST(Backlash, MayBeLeftOpenWhereBothWaysAreAlike) {
                 turned_deg(visit, open), 1e-12);
 }
 
+TEST(DeltaPeriodic, OfOrdersThatLookTheSameOnTheGridTheLowestStandsForAll) {
+  const auto orders = [](double step_deg) {
+    VisitLog log = example_log();
+    for (std::size_t k = 0; k < log.visits.size(); ++k)
+      log.visits[k].delta_rad = static_cast<double>(k) * step_deg * std::numbers::pi / 180;
+    std::vector<double> found;
+    for (const Hypothesis& start : catalogued("rig.delta_periodic").hypotheses(log, 0))
+      found.push_back(start.p[0]);
+    return found;
+  };
+  EXPECT_THAT(orders(10), SizeIs(15));
+  EXPECT_THAT(orders(15), ElementsAre(3, 4, 5, 6, 7, 8, 9, 10, 11, 12));
+  EXPECT_THAT(orders(60), ElementsAre(3));
+}
+
 // Codes are numbered from the lowest that a set shows, and another set shows another.
 TEST(Quantization, IsTheSameInASetThatBeginsAtAnotherCode) {
   constexpr double kStep_V = 4 * 5.0 / 65536;
@@ -425,6 +440,35 @@ TEST(AverageOfThePast, ForgetsWithinTheRunThatIsSearched) {
   }
 }
 
+// A set of readings may begin long after the one before it ended.
+TEST(AverageOfThePast, LagsBehindAnEvenRiseAsFarAfterAGapAsBefore) {
+  constexpr double kTau_s = 10, kGap_s = 600, kRise_K_per_s = 0.01;
+  VisitLog log = example_log();
+  for (std::size_t k = 0; k < log.visits.size(); ++k) {
+    Visit& visit = log.visits[k];
+    if (k >= 30) {
+      visit.t_arrival_s += kGap_s;
+      visit.t_mean_s += kGap_s;
+    }
+    visit.temperature_K = kRise_K_per_s * visit.t_mean_s;
+  }
+  int seen = 0;
+  for (const auto& term : smooth_terms(log, SmoothTermSelection::any)) {
+    if (term->driver() != "temp_C.rate" || term->form() != TermForm::bias ||
+        term->shape() != "straight line in the average of the past")
+      continue;
+    ++seen;
+    EnlargedParameters with = twelve();
+    with.effects = {activate(*term, 0, term->hypotheses(log, 0).front())};
+    with.effects[0].p[3] = kTau_s;
+    const Eigen::VectorXd change =
+        predict_means_V(log, with)[0] - predict_means_V(log, twelve())[0];
+    const Eigen::VectorXd settled = change.tail(40);
+    EXPECT_LT((settled.array() - settled.mean()).abs().maxCoeff(), 0.01 * std::abs(settled.mean()));
+  }
+  EXPECT_EQ(seen, 1);
+}
+
 // Beside creep the 12 parameters are those of a long rest.
 TEST(AverageOfThePast, OfTheAttitudeIsNothingAfterALongRest) {
   VisitLog log = example_log();
@@ -471,13 +515,17 @@ TEST(SmoothTerms, OfOneDriverFormAndShapeSayTheSame) {
   EXPECT_GT(again, 0);
 }
 
-TEST(LegendreSeries, GoesStraightOnBeyondTheRange) {
+TEST(LegendreSeries, GoesOnBeyondTheRangeAsFarAsItIsTold) {
   const double c[] = {0.5, 0.25, 0.125};
   for (const double end : {-1.0, 1.0}) {
     EXPECT_NEAR(legendre_series(3 * end, -1, 1, c, 1), 1.5 * end, 1e-15);
     const double slope = 0.5 + 0.25 * 3 * end;
     EXPECT_NEAR(legendre_series(2 * end, -1, 1, c, 2), 0.5 * end + 0.25 + slope * end, 1e-15);
     EXPECT_EQ(legendre_series(2 * end, -1, 1, c, 3), legendre_series(end, -1, 1, c, 3));
+    const auto parabola = [&c](double x) { return 0.5 * x + 0.25 * std::legendre(2U, x); };
+    EXPECT_NEAR(legendre_series(1.5 * end, -1, 1, c, 2, 0.5), parabola(1.5 * end), 1e-15);
+    EXPECT_NEAR(legendre_series(2.5 * end, -1, 1, c, 2, 0.5),
+                parabola(1.5 * end) + (0.5 + 0.25 * 3 * 1.5 * end) * end, 1e-15);
   }
   EXPECT_NEAR(legendre_series(0.3, -1, 1, c, 3),
               0.5 * 0.3 + 0.25 * std::legendre(2, 0.3) + 0.125 * std::legendre(3, 0.3), 1e-15);

@@ -253,6 +253,32 @@ TEST(ResidualTest, FindsAQuadraticAndAWrongPose) {
             1e-6);
 }
 
+// While the record was taken something went on that did not in the run, or that its model explains.
+TEST(NoisePool, LetsTheRecordKeepSlowNoiseThatTheRunHasNot) {
+  const auto record = [](double walk) {
+    return identify_noise(simulate(10000, 100, 0, 1e-3, walk, 0, 77), 100);
+  };
+  int contradicted = 0;
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    const SmallRun run = make_run(seed, 0);
+    const NoiseProcesses processes = noise_processes(run.windows);
+    const auto pooled = [&](const NoiseModel& noise) {
+      return NoisePool(processes, noise, Eigen::VectorXd()).pool(run.mean, run.design);
+    };
+    const PooledNoise alike = pooled(run.noise), other = pooled(record(3e-3)),
+                      quieter = pooled(record(0));
+    contradicted += alike.record_apart ? 1 : 0;
+    EXPECT_TRUE(other.record_apart);
+    EXPECT_FALSE(quieter.record_apart) << "what the run has more of may be an effect";
+    const auto slow_V2 = [](const PooledNoise& noise) {
+      const Eigen::MatrixXd& V = noise.covariance;
+      return V.diagonal().mean() - V.mean();
+    };
+    EXPECT_LT(slow_V2(other), 4 * slow_V2(alike));
+  }
+  EXPECT_EQ(contradicted, 0);
+}
+
 TEST(AllowanceForPowers, OnePowerScalesEverythingAndMovesNothing) {
   const SmallRun run = make_run(1, 0);
   const NoiseProcesses processes = noise_processes(run.windows);
