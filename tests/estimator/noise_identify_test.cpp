@@ -255,8 +255,11 @@ TEST(ResidualTest, FindsAQuadraticAndAWrongPose) {
 
 // While the record was taken something went on that did not in the run, or that its model explains.
 TEST(NoisePool, LetsTheRecordKeepSlowNoiseThatTheRunHasNot) {
-  const auto record = [](double walk) {
-    return identify_noise(simulate(10000, 100, 0, 1e-3, walk, 0, 77), 100);
+  const auto record = [](double walk, double wave) {
+    std::vector<double> values = simulate(10000, 100, 0, 1e-3, walk, 0, 77);
+    for (std::size_t k = 0; k < values.size(); ++k)
+      values[k] += wave * std::sin(0.1 * 0.01 * static_cast<double>(k));
+    return identify_noise(values, 100);
   };
   int contradicted = 0;
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
@@ -265,8 +268,8 @@ TEST(NoisePool, LetsTheRecordKeepSlowNoiseThatTheRunHasNot) {
     const auto pooled = [&](const NoiseModel& noise) {
       return NoisePool(processes, noise, Eigen::VectorXd()).pool(run.mean, run.design);
     };
-    const PooledNoise alike = pooled(run.noise), other = pooled(record(3e-3)),
-                      quieter = pooled(record(0));
+    const PooledNoise alike = pooled(run.noise), other = pooled(record(3e-4, 0.05)),
+                      quieter = pooled(record(0, 0));
     contradicted += alike.record_apart ? 1 : 0;
     EXPECT_TRUE(other.record_apart);
     EXPECT_FALSE(quieter.record_apart) << "what the run has more of may be an effect";
