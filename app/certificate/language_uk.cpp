@@ -466,6 +466,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"the spectrum falls above {} Hz as no term does: the terms hold below", "вище {} Hz спектр спадає так, як жоден доданок: доданки чинні нижче"},
     {"the noise is below half a step of the values ({})", "шум менший за половину кроку значень ({})"},
     {"the terms do not describe the spectrum of this record", "доданки не описують спектра цього запису"},
+    {"the run has less slow noise than the static record, which had no say in it", "вимірювання має менше повільного шуму, ніж запис у спокої, який на його оцінку не вплинув"},
     {"the five terms do not describe the spectrum of this record", "п'ять доданків не описують спектра цього запису"},
     {"the fit of the noise terms did not converge", "оцінювання доданків шуму не збіглося"},
     {"white noise from the scatter within the poses", "білий шум за розсіянням у межах положень"},
