@@ -64,8 +64,9 @@ std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
 std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target);
 /// The same between two unknown times.
 std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target);
-/// There at once from an unknown time on, then it dies away by an unknown time constant.
-std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target);
+/// There at once from an unknown time on, then it dies away by an unknown time constant, no longer
+/// than `longest_s`: what lasts is a step.
+std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target, double longest_s);
 /// There for part of every period, of unknown length and width: something switches on and off.
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target);
 /// Grows in a straight line and falls back at once, over and over.

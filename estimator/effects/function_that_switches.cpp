@@ -145,7 +145,8 @@ class Window final : public DrivenTerm {
 /// A shock: there at once, then it dies away.
 class Relaxation final : public DrivenTerm {
  public:
-  using DrivenTerm::DrivenTerm;
+  Relaxation(DriverPointer clock, const Target& target, double longest_s)
+      : DrivenTerm(std::move(clock), target), longest_s_(longest_s) {}
 
   std::vector<ParameterInfo> parameters() const override {
     return {{"from", "s", ParameterRole::index},
@@ -181,13 +182,15 @@ class Relaxation final : public DrivenTerm {
  private:
   std::string function() const override { return "jump that dies away"; }
   double at(double t_s, const double* p) const override {
-    return t_s > p[0] ? p[2] * std::exp((p[0] - t_s) / p[1]) : 0;
+    return t_s > p[0] && p[1] <= longest_s_ ? p[2] * std::exp((p[0] - t_s) / p[1]) : 0;
   }
   void add_from(double from_s, std::vector<Hypothesis>& starts) const {
     const double span_s = range().second - range().first;
     for (const double tau_s : effect::geometric(span_s / 40, span_s / 4, 4))
       starts.push_back({{half_way_between_visits(from_s), tau_s, target().typical_size()}});
   }
+
+  double longest_s_;
 };
 
 class SawTooth final : public DrivenTerm {
@@ -299,8 +302,9 @@ std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target) {
   return std::make_unique<Window>(std::move(clock), target);
 }
 
-std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target) {
-  return std::make_unique<Relaxation>(std::move(clock), target);
+std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target,
+                                       double longest_s) {
+  return std::make_unique<Relaxation>(std::move(clock), target, longest_s);
 }
 
 std::unique_ptr<SmoothTerm> pulses(DriverPointer driver, const Target& target) {

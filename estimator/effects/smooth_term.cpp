@@ -92,9 +92,7 @@ class TermList {
       add(friction(attitude, kBias));
       add(friction(attitude, {.form = TermForm::scale, .second = 0}));
     }
-    const double longest_s =
-        any_ ? std::numeric_limits<double>::infinity() : log_.last_s() - log_.first_s();
-    for (auto& term : memory_terms(log_, longest_s, attitude, columns_)) add(std::move(term));
+    for (auto& term : memory_terms(log_, longest_s(), attitude, columns_)) add(std::move(term));
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
       const auto code = std::make_shared<const Driver>(code_driver(log_, axis));
       if (any_ || code->varies()) add_of_code(code);
@@ -175,13 +173,17 @@ class TermList {
     for (const Target& target : {kBias, kScale}) add(play(driver, target));
     add(wave(driver, kBias, {1.5, 0.5, 10}));
   }
+  /// The longest time constant that the visits show.
+  double longest_s() const {
+    return any_ ? std::numeric_limits<double>::infinity() : log_.last_s() - log_.first_s();
+  }
   void add_of_clock(const DriverPointer& clock) {
     add(bell(clock, kBias));
     add(window(clock, kBias));
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));
     for (const Target& target : {kBias, kScale}) {
-      add(relaxation(clock, target));
+      add(relaxation(clock, target, longest_s()));
       add(power(clock, target));
       add(logarithm(clock, target));
     }
