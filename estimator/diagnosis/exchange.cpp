@@ -382,10 +382,7 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
                                       [](const Candidate&) { return false; }});
   if (!found || !found->significant || found->candidate == model.index(k)) return false;
   const auto cost = [&](const EnlargedParameters& with, std::size_t candidate) {
-    Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};
-    before.known[axis] = nullptr;
-    const Stage stage_with = settle_noise(model.input(), with, before);
-    return stage_with.noise[axis].likelihood_deviance + model.price(candidate);
+    return deviance_of_axis(model.input(), with, axis, stage) + model.price(candidate);
   };
   const double now = cost(model.stage().fit.parameters, model.index(k));
   const double then = cost(found->model, found->candidate);

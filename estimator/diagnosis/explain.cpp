@@ -21,14 +21,6 @@
 namespace plumbline {
 namespace {
 
-constexpr const char* kQuieterThanRecord =
-    "the run has less slow noise than the static record, which had no say in it";
-
-void add_remark(NoiseModel& noise, const char* remark) {
-  if (!noise.remark.empty()) noise.remark += "; ";
-  noise.remark += remark;
-}
-
 /// The means of which errors are stated: as measured where that is all that most of them say.
 PerAxis<Eigen::VectorXd> stated_means_V(const SearchInput& search, const SearchResult& found) {
   PerAxis<Eigen::VectorXd> means_V = found.observed.mean_V;
@@ -173,7 +165,9 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
                        options.own_effects, search_options);
   SearchResult& found = searched.found;
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    if (found.noise[i].record_apart) add_remark(result.noise[i], kQuieterThanRecord);
+    if (found.noise[i].record_apart)
+      add_remark(result.noise[i].remark,
+                 "the run has less slow noise than the static record, which had no say in it");
   const auto add_noise_to = [&](Diagnosis& diagnosis, const EnlargedParameters& model) {
     add_noise(input.noise_follows, model, diagnosis);
     add_noise(wanders_beyond_record(search, found), model, diagnosis);

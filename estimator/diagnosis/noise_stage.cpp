@@ -214,6 +214,13 @@ Stage settle(const SearchInput& input, const EnlargedParameters& parameters, con
   return stage;
 }
 
+double deviance_of_axis(const SearchInput& input, const EnlargedParameters& parameters,
+                        std::size_t axis, const Stage& stage) {
+  Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};
+  before.known[axis] = nullptr;
+  return settle_noise(input, parameters, before).noise[axis].likelihood_deviance;
+}
+
 Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchResult& found,
                                          const Eigen::MatrixXd& jacobian) {
   const Eigen::MatrixXd& C = found.fit.covariance;

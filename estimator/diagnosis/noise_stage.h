@@ -43,6 +43,11 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
 /// after the parameters are known settles both.
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters, const Before& before);
 
+/// −2 ln L of the readings of one axis under given parameters, but for a constant: its noise
+/// estimated beside them, all else as in `stage`.
+double deviance_of_axis(const SearchInput& input, const EnlargedParameters& parameters,
+                        std::size_t axis, const Stage& stage);
+
 /// The covariance of the parameters of `found`, the powers of its noise being estimates, too:
 /// with_allowance() of all axes. `jacobian`: prediction_jacobian() there.
 Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchResult& found,

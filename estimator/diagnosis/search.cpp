@@ -165,10 +165,8 @@ class Search {
         !is_slow(input_, with, with.effects.size() - 1, any_course_of_time(input_.log)))
       return true;
     const Stage& stage = model_.stage();
-    Before before{.known = all_of(stage.noise), .start = &stage.noise, .freed = &stage};
-    before.known[newcomer.axis] = nullptr;
     const auto deviance = [&](const EnlargedParameters& parameters) {
-      return settle_noise(input_, parameters, before).noise[newcomer.axis].likelihood_deviance;
+      return deviance_of_axis(input_, parameters, newcomer.axis, stage);
     };
     const double gain = deviance(stage.fit.parameters) - deviance(with);
     return model_.p_of(newcomer, log_chi_squared_tail(std::max(0.0, gain), dof)) <=

@@ -116,13 +116,11 @@ bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::siz
 
 bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis) {
   constexpr double kOfFast = 0.3;  // variances
-  const auto& unit = input.processes.unit;
   const Eigen::VectorXd& power = stage.noise[axis].power;
   double fast_V2 = stage.own_V2[axis].mean(), slow_V2 = 0;
-  for (std::size_t i = 0; i < unit.size(); ++i) {
-    const double over_the_run = unit[i].diagonal().mean() - unit[i].mean();
-    (i < kTermB ? fast_V2 : slow_V2) += power(static_cast<Eigen::Index>(i)) * over_the_run;
-  }
+  for (Eigen::Index i = 0; i < power.size(); ++i)
+    (i < NoiseProcesses::kFirstSlow ? fast_V2 : slow_V2) +=
+        power(i) * input.processes.variance_over_run(i);
   return slow_V2 > kOfFast * fast_V2;
 }
 

@@ -1,5 +1,6 @@
 #include "estimator/effects/effect.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "estimator/noise/chi_squared.h"
@@ -24,6 +25,16 @@ namespace effect {
 double share_below(double edge, double value, double sd) {
   if (!(sd > 0)) return value < edge ? 1 : 0;
   return normal_below((edge - value) / sd);
+}
+
+int positions_of_a_turn(std::vector<double> angles_rad) {
+  constexpr double kNear_rad = 1e-3;
+  std::sort(angles_rad.begin(), angles_rad.end());
+  double closest_rad = kTurn_rad;
+  for (std::size_t k = 1; k < angles_rad.size(); ++k)
+    if (const double apart_rad = angles_rad[k] - angles_rad[k - 1]; apart_rad > kNear_rad)
+      closest_rad = std::min(closest_rad, apart_rad);
+  return static_cast<int>(std::lround(kTurn_rad / closest_rad));
 }
 
 Eigen::ArrayXd since_arrival_s(const Visit& visit) {

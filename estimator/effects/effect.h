@@ -169,6 +169,9 @@ inline constexpr std::size_t kPartsOfDwell = 8;
 inline constexpr double kSmallTerm = 1e-3;
 inline constexpr double kSmallAngle_deg = 0.02;
 
+/// How many positions a turn has, as closely as two of these angles lie together. Harmonics of more
+/// than half of that look like lower ones.
+int positions_of_a_turn(std::vector<double> angles_rad);
 /// Times of the samples of the visit from the first on.
 Eigen::ArrayXd since_arrival_s(const Visit& visit);
 /// exp(−(t − t_arrival)/τ) at those times.

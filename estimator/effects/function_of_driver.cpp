@@ -122,7 +122,7 @@ class Harmonic final : public DrivenTerm {
   // Positions at equal distances do not tell n from their number less n.
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     constexpr int kHighest = 18;
-    const int positions = positions_of_a_turn();
+    const int positions = effect::positions_of_a_turn(variable().value[0]);
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
     for (int n = lowest_; n <= kHighest && 2 * n <= positions; ++n) {
@@ -138,17 +138,6 @@ class Harmonic final : public DrivenTerm {
   std::string function() const override { return "harmonic"; }
   double at(double value, const double* p) const override {
     return p[1] * std::cos(p[0] * value) + p[2] * std::sin(p[0] * value);
-  }
-  /// As closely as two of the visits' positions lie together.
-  int positions_of_a_turn() const {
-    constexpr double kNear_rad = 1e-3;
-    std::vector<double> places = variable().value[0];
-    std::sort(places.begin(), places.end());
-    double closest_rad = effect::kTurn_rad;
-    for (std::size_t k = 1; k < places.size(); ++k)
-      if (const double apart_rad = places[k] - places[k - 1]; apart_rad > kNear_rad)
-        closest_rad = std::min(closest_rad, apart_rad);
-    return static_cast<int>(std::lround(effect::kTurn_rad / closest_rad));
   }
 
   int lowest_;

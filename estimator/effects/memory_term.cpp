@@ -36,11 +36,10 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
     const double dwell_s = visit.step_s * static_cast<double>(visit.count);
     if (k > 0) {
       const double gap_s = visit.t_arrival_s - end_s;
+      const double from = value[k - 1], to = between == InBetween::evenly ? value[k] : from;
       // Behind what changes evenly an average lags by what that changes in a time constant.
-      const double lag =
-          between == InBetween::evenly && gap_s > 0 ? tau_s / gap_s * (value[k] - value[k - 1]) : 0;
-      const double left = std::exp(-gap_s / tau_s) * (state - value[k - 1] + lag);
-      state = (between == InBetween::evenly ? value[k] : value[k - 1]) - lag + left;
+      const double lag = gap_s > 0 ? tau_s / gap_s * (to - from) : 0;
+      state = to - lag + std::exp(-gap_s / tau_s) * (state - from + lag);
       if (between == InBetween::with_the_head && log.is_rest(k)) state = value[k];
     }
     average[k] =

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "estimator/measurement.h"
@@ -87,6 +88,12 @@ struct RecordTerms {
   double p_value_without_lines = 1;
   std::string remark;  ///< what a person should know; empty when there is nothing
 };
+
+/// One more thing that a person should know, after what is there.
+inline void add_remark(std::string& remark, std::string_view more) {
+  if (!remark.empty()) remark += "; ";
+  remark += more;
+}
 
 /// Neighbouring coefficients of a record's cosine spectrum taken together (term_fit.h). A list of
 /// them is all that a record says about the noise powers: its likelihood can be pooled with other

@@ -216,37 +216,33 @@ bool add_rounding(double rate_hz, RecordTerms& result) {
 std::string remark_on(const RecordTerms& terms, const Misfit& misfit, bool rolls_off, bool coarse) {
   std::string remark;
   char text[160];
-  const auto add = [&] {
-    if (!remark.empty()) remark += "; ";
-    remark += text;
-  };
   if (!terms.lines.empty()) {
     const SpectralLine& line = terms.lines.front();
     std::snprintf(text, sizeof text, "a periodic line at %.4g Hz, amplitude %.3g, is not noise",
                   line.f_hz, line.amplitude);
-    add();
+    add_remark(remark, text);
     std::size_t harmonics = 0;
     for (const SpectralLine& other : terms.lines) harmonics += other.harmonic > 1 ? 1 : 0;
     if (terms.lines.size() > 1) {
       std::snprintf(text, sizeof text, "%zu lines in all, %zu of them harmonics",
                     terms.lines.size(), harmonics);
-      add();
+      add_remark(remark, text);
     }
   }
   if (rolls_off) {
     std::snprintf(text, sizeof text,
                   "the spectrum falls above %.3g Hz as no term does: the terms hold below",
                   terms.band_hz);
-    add();
+    add_remark(remark, text);
   }
   if (coarse) {
     std::snprintf(text, sizeof text, "the noise is below half a step of the values (%.3g)",
                   terms.step);
-    add();
+    add_remark(remark, text);
   }
   if (!misfit.adequate()) {
     std::snprintf(text, sizeof text, "the terms do not describe the spectrum of this record");
-    add();
+    add_remark(remark, text);
   }
   return remark;
 }

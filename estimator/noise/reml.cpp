@@ -17,7 +17,6 @@ namespace plumbline {
 
 namespace {
 
-constexpr double kMarkovRatio = 4;  // of neighbouring correlation times
 // By so much, of −2 ln L, must record and run be likelier with slow noise of their own each.
 constexpr double kPriceOfApart = 8;
 
@@ -29,55 +28,7 @@ bool has_diagonal_only(const Eigen::MatrixXd& covariance) {
   return true;
 }
 
-/// The same process with its course over the run counted from its mean, and the variance of that
-/// mean added to all entries alike. Differences between windows are what they were, and so is all
-/// that is estimated beside a free zero; but the zero becomes the level of the whole run instead of
-/// the one at its ends, and its uncertainty still holds the wandering of that level.
-Eigen::MatrixXd about_mean_of_run(const Eigen::MatrixXd& covariance) {
-  const Eigen::VectorXd with_mean = covariance.rowwise().mean();
-  const double of_mean = with_mean.mean();
-  Eigen::MatrixXd result = covariance;
-  result.colwise() -= with_mean;
-  result.rowwise() -= with_mean.transpose();
-  result.array() += 2 * of_mean;
-  return result;
-}
-
-/// Those that change over the run rather than from visit to visit.
-std::vector<Eigen::Index> walks(const NoiseProcesses& processes) {
-  constexpr Eigen::Index kSlowest = 2;  // Gauss-Markov processes
-  std::vector<Eigen::Index> all = {kTermK};
-  for (Eigen::Index m = 0; m < std::min(kSlowest, std::ssize(processes.decay_per_s)); ++m)
-    all.push_back(NoiseProcesses::kFirstMarkov + m);
-  return all;
-}
-
 }  // namespace
-
-NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows) {
-  NoiseProcesses processes;
-  auto terms = unit_covariances(windows, 0);
-  for (std::size_t term = 0; term < static_cast<std::size_t>(NoiseProcesses::kFirstMarkov); ++term)
-    processes.unit.push_back(term < kTermB ? std::move(terms[term])
-                                           : about_mean_of_run(terms[term]));
-  if (windows.empty()) return processes;
-  const double span_s =
-      windows.back().first_s + windows.back().duration_s() - windows.front().first_s;
-  std::vector<double> dwell_s;
-  dwell_s.reserve(windows.size());
-  for (const SampleWindow& window : windows) dwell_s.push_back(window.duration_s());
-  std::nth_element(dwell_s.begin(), dwell_s.begin() + std::ssize(dwell_s) / 2, dwell_s.end());
-  const double shortest_s = 0.5 * dwell_s[dwell_s.size() / 2];
-  double tau_s = 0.7 * span_s;
-  while (tau_s > shortest_s) {
-    processes.decay_per_s.push_back(1 / tau_s);
-    processes.unit.push_back(about_mean_of_run(bounded_walk(windows, 1 / tau_s)));
-    tau_s /= kMarkovRatio;
-  }
-  for (const Eigen::MatrixXd& unit : processes.unit)
-    processes.is_diagonal.push_back(unit.isDiagonal(0));
-  return processes;
-}
 
 Projector make_projector(Eigen::MatrixXd covariance, const Eigen::MatrixXd& design) {
   Projector result;
@@ -117,7 +68,7 @@ struct NoisePool::Point {
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
   /// Of χ², what the run shows of each process and what its power makes expect.
-  Eigen::VectorXd seen, expected;
+  Eigen::VectorXd seen = {}, expected = {};
 };
 
 /// Where a search ended.
@@ -174,15 +125,20 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
   record_.own.resize(bins);
   for (Eigen::Index bin = 0; bin < bins; ++bin)
     record_.own(bin) = descriptions.front().bins[static_cast<std::size_t>(bin)].known;
-  record_apart_ = with_slow_noise_of_its_own(record_);
+  record_apart_ = apart();
 }
 
-NoisePool::Record NoisePool::with_slow_noise_of_its_own(const Record& record) const {
-  const Climb alone = climb(starting_powers(), free_powers(),
-                            [&](const Eigen::VectorXd& power) { return record_at(power, record); });
-  Record apart = record;
-  for (const Eigen::Index i : walks(*processes_)) {
-    apart.own += record.shared.col(i) * alone.top.power(i);
+NoisePool::Climb NoisePool::climb_of_record() const {
+  return climb(starting_powers(), free_powers(),
+               [this](const Eigen::VectorXd& power) { return record_at(power, record_); });
+}
+
+NoisePool::Record NoisePool::apart() const {
+  const Eigen::VectorXd power = climb_of_record().top.power;
+  Record apart = record_;
+  apart.price = kPriceOfApart;
+  for (const Eigen::Index i : processes_->walks()) {
+    apart.own += record_.shared.col(i) * power(i);
     apart.shared.col(i).setZero();
   }
   return apart;
@@ -214,8 +170,10 @@ Eigen::MatrixXd NoisePool::covariance(const Eigen::VectorXd& power) const {
 
 NoisePool::Point NoisePool::record_at(const Eigen::VectorXd& power, const Record& record) const {
   const Eigen::Index count = processes_->count();
-  Point point{power, 0, 0, Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count),
-              {},    {}};
+  Point point{.power = power,
+              .deviance = record.price,
+              .normal = Eigen::MatrixXd::Zero(count, count),
+              .right = Eigen::VectorXd::Zero(count)};
   if (record.shared.size() == 0) return point;
   const std::vector<SpectrumBin>& bins = model_.descriptions.front().bins;
   const Eigen::VectorXd variance = record.shared * power + record.own;
@@ -308,8 +266,7 @@ Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise, const Eigen:
     else
       seen.emplace_back(P * unit);
   }
-  Eigen::MatrixXd information =
-      record_at(noise.power, record(noise.record_apart)).normal(wanted, wanted);
+  Eigen::MatrixXd information = record_at(noise.power, record_for(noise)).normal(wanted, wanted);
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
@@ -323,7 +280,7 @@ Eigen::MatrixXd NoisePool::information_of(const PooledNoise& noise, const Eigen:
 EstimatedPowers NoisePool::estimated(const PooledNoise& found, const Eigen::MatrixXd& P,
                                      const Eigen::VectorXd& mean,
                                      const Eigen::MatrixXd& design) const {
-  Point point = scoring_step(found.power, P, P * mean, record(found.record_apart));
+  Point point = scoring_step(found.power, P, P * mean, record_for(found));
   if (!quantization_is_free()) {
     point.normal.row(kTermQ).setZero();
     point.normal.col(kTermQ).setZero();
@@ -355,14 +312,15 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
   if (!free[kTermQ]) first(kTermQ) = 0;
   // Powers that were found to be zero need a little to find the way back.
   if (start != nullptr) first = start->cwiseMax(0.02 * first);
-  const Climb shared = climb(first, free, mean, design, false);
+  const Climb shared = climb(first, free, mean, design, record_);
   // Of χ²: with less missing in the run, nothing pays the price.
   constexpr double kMissing = 2;
   double missing = 0;
-  for (const Eigen::Index i : walks(*processes_))
+  for (const Eigen::Index i : processes_->walks())
     missing += shared.top.expected(i) - shared.top.seen(i);
   if (record_.shared.size() == 0 || missing < kMissing) return pooled(shared, false);
-  const PooledNoise apart = pooled(climb(shared.top.power, free, mean, design, true), true);
+  const PooledNoise apart =
+      pooled(climb(shared.top.power, free, mean, design, record_apart_), true);
   const bool is_apart = apart.deviance < shared.top.deviance &&
                         walk_variance_V2(apart.power) < walk_variance_V2(shared.top.power);
   return is_apart ? apart : pooled(shared, false);
@@ -370,10 +328,8 @@ PooledNoise NoisePool::pool(const Eigen::VectorXd& mean, const Eigen::MatrixXd& 
 
 double NoisePool::walk_variance_V2(const Eigen::VectorXd& power) const {
   double sum_V2 = 0;
-  for (const Eigen::Index i : walks(*processes_)) {
-    const Eigen::MatrixXd& unit = processes_->unit[static_cast<std::size_t>(i)];
-    sum_V2 += power(i) * (unit.diagonal().mean() - unit.mean());
-  }
+  for (const Eigen::Index i : processes_->walks())
+    sum_V2 += power(i) * processes_->variance_over_run(i);
   return sum_V2;
 }
 
@@ -385,8 +341,7 @@ double NoisePool::gain_of_slow_noise(const PooledNoise& found, const Eigen::Vect
   std::vector<bool> free(static_cast<std::size_t>(first.size()), false);
   free[kTermQ] = quantization_is_free();
   free[kTermN] = true;
-  return pooled(climb(first, free, mean, design, found.record_apart), found.record_apart).deviance -
-         found.deviance;
+  return climb(first, free, mean, design, record_for(found)).top.deviance - found.deviance;
 }
 
 template <typename Evaluate>
@@ -420,29 +375,22 @@ NoisePool::Climb NoisePool::climb(const Eigen::VectorXd& first, const std::vecto
 
 NoisePool::Climb NoisePool::climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
                                   const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
-                                  bool record_apart) const {
-  return climb(first, free, [&](const Eigen::VectorXd& power) {
-    return evaluate(power, mean, design, record(record_apart));
-  });
+                                  const Record& record) const {
+  return climb(first, free,
+               [&](const Eigen::VectorXd& power) { return evaluate(power, mean, design, record); });
 }
 
 PooledNoise NoisePool::pooled(const Climb& climb, bool record_apart) const {
-  const double price = record_apart ? kPriceOfApart : 0;
-  return {climb.top.power,
-          covariance(climb.top.power),
-          climb.top.deviance + price,
-          climb.top.likelihood_deviance + price,
-          climb.converged,
-          record_apart};
+  return {climb.top.power,    covariance(climb.top.power),
+          climb.top.deviance, climb.top.likelihood_deviance,
+          climb.converged,    record_apart};
 }
 
 std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
                                                       const Eigen::VectorXd& mean,
                                                       const Eigen::MatrixXd& design) const {
   if (record_.shared.size() == 0) return std::nullopt;
-  const Climb of_record =
-      climb(starting_powers(), free_powers(),
-            [&](const Eigen::VectorXd& power) { return record_at(power, record_); });
+  const Climb of_record = climb_of_record();
   const PooledNoise of_run =
       NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);
   return Contradiction{both.deviance - of_record.top.deviance - of_run.deviance,
@@ -454,8 +402,8 @@ PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& m
   const Projector projector = make_projector(lower_covariance(power), design);
   const double of_run = projector.log_determinant + mean.dot(projector.P * mean);
   const double shared = record_at(power, record_).deviance;
-  const double apart = record_at(power, record_apart_).deviance + kPriceOfApart;
-  const bool is_apart = record_.shared.size() > 0 && apart < shared;
+  const double apart = record_at(power, record_apart_).deviance;
+  const bool is_apart = apart < shared;
   const double deviance = of_run + (is_apart ? apart : shared);
   return {power, covariance(power), deviance, deviance - projector.log_determinant_of_design,
           true,  is_apart};
@@ -511,7 +459,8 @@ NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
   // Equal variances in every ratio of correlation times are flicker of this level.
   double flicker = pooled.power(kTermB);
   for (const double v : variance)
-    flicker += std::numbers::pi * v / (std::log(kMarkovRatio) * static_cast<double>(markov));
+    flicker += std::numbers::pi * v /
+               (std::log(NoiseProcesses::kMarkovRatio) * static_cast<double>(markov));
   set(model.B, flicker);
   return model;
 }

@@ -5,25 +5,10 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/noise/covariance.h"
 #include "estimator/noise/noise_model.h"
+#include "estimator/noise/noise_processes.h"
 
 namespace plumbline {
-
-/// The independent processes that the noise of a run is taken to consist of: quantization, white,
-/// flicker and random walk of IEEE Std 952, then first-order Gauss-Markov processes (unit driving
-/// density) whose correlation times go from a dwell to the whole run in equal ratios. What is seen
-/// of real flicker, of several relaxations or of walks that level off, is a sum of these.
-struct NoiseProcesses {
-  static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
-  static constexpr Eigen::Index kFirstSlow = kTermB;
-  std::vector<double> decay_per_s;    ///< of the Gauss-Markov processes, slowest first
-  std::vector<Eigen::MatrixXd> unit;  ///< covariance of the window means, power 1
-  std::vector<bool> is_diagonal;      ///< of each: without memory between windows
-
-  Eigen::Index count() const { return std::ssize(unit); }
-};
-NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows);
 
 /// What is known of the noise of the window means of one axis.
 struct PooledNoise {
@@ -96,11 +81,17 @@ class NoisePool {
   struct Record {
     Eigen::VectorXd own;
     Eigen::MatrixXd shared;
+    double price = 0;  ///< of −2 ln L, for having noise of its own
   };
-  const Record& record(bool apart) const { return apart ? record_apart_ : record_; }
+  const Record& record_for(const PooledNoise& noise) const {
+    return noise.record_apart ? record_apart_ : record_;
+  }
   /// The record's restricted likelihood and its derivatives; zero without a record.
   Point record_at(const Eigen::VectorXd& power, const Record& record) const;
-  Record with_slow_noise_of_its_own(const Record& record) const;
+  /// Where the record by itself leads.
+  Climb climb_of_record() const;
+  /// The record with slow noise of its own.
+  Record apart() const;
   Eigen::MatrixXd lower_covariance(const Eigen::VectorXd& power) const;
   Seen see(const Eigen::MatrixXd& P, const Eigen::VectorXd& py) const;
   /// `normal` and `right` of both sources; P is the projector of the powers' Σ and of the design.
@@ -128,9 +119,10 @@ class NoisePool {
   template <typename Evaluate>
   Climb climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
               const Evaluate& evaluate) const;
-  /// pool() from there, with the record together with the run or apart.
+  /// The same of run and record together.
   Climb climb(const Eigen::VectorXd& first, const std::vector<bool>& free,
-              const Eigen::VectorXd& mean, const Eigen::MatrixXd& design, bool record_apart) const;
+              const Eigen::VectorXd& mean, const Eigen::MatrixXd& design,
+              const Record& record) const;
   PooledNoise pooled(const Climb& climb, bool record_apart) const;
   /// Variance over the run that the walks among these powers make.
   double walk_variance_V2(const Eigen::VectorXd& power) const;

@@ -1,0 +1,36 @@
+// What the noise of a run consists of, as the means of its windows see it.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "estimator/noise/covariance.h"
+#include "estimator/noise/noise_model.h"
+
+namespace plumbline {
+
+/// The independent processes that the noise of a run is taken to consist of: quantization, white,
+/// flicker and random walk of IEEE Std 952, then first-order Gauss-Markov processes (unit driving
+/// density) whose correlation times go from a dwell to the whole run in equal ratios. What is seen
+/// of real flicker, of several relaxations or of walks that level off, is a sum of these.
+struct NoiseProcesses {
+  static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
+  static constexpr Eigen::Index kFirstSlow = kTermB;
+  static constexpr double kMarkovRatio = 4;  ///< of neighbouring correlation times
+  std::vector<double> decay_per_s;           ///< of the Gauss-Markov processes, slowest first
+  std::vector<Eigen::MatrixXd> unit;         ///< covariance of the window means, power 1
+  std::vector<bool> is_diagonal;             ///< of each: without memory between windows
+
+  Eigen::Index count() const { return std::ssize(unit); }
+  /// Those that change over the run rather than from visit to visit.
+  std::vector<Eigen::Index> walks() const;
+  /// Mean variance about the mean of the run that a power of 1 of one of them makes.
+  double variance_over_run(Eigen::Index process) const {
+    const Eigen::MatrixXd& covariance = unit[static_cast<std::size_t>(process)];
+    return covariance.diagonal().mean() - covariance.mean();
+  }
+};
+NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows);
+
+}  // namespace plumbline
