@@ -64,6 +64,7 @@ double mean_decay(const Visit& visit, double origin_s, double tau_s) {
 
 std::vector<double> geometric(double first, double last, int count) {
   std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(count));
   for (int k = 0; k < count; ++k)
     values.push_back(first * std::pow(last / first, k / (count - 1.0)));
   return values;
