@@ -17,6 +17,7 @@
 #include "app/issue_time.h"
 #include "app/sequencer/separation_plan.h"
 #include "app/summary.h"
+#include "estimator/decision.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline::app {
@@ -61,6 +62,19 @@ bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limit
   const DecisionStatus status = outcome.calibration.decision.status;
   if (status == DecisionStatus::fail || status == DecisionStatus::conditional_fail) return true;
   return outcome.verification && !within_limits(*outcome.verification, limits).value_or(true);
+}
+
+/// Fresh poses took no part in the fit either: the decision is by the largest error of all.
+Decision with_fresh_poses(const Calibration& calibration, const Evaluation& verification) {
+  Decision decision = calibration.decision;
+  if (decision.status == DecisionStatus::none) return decision;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double error_mps2 = verification.after.pose_max_abs_mps2[i];
+    if (error_mps2 > decision.max_abs_error_mps2)
+      decision =
+          decide(decision.limit_mps2, error_mps2, calibration.after.heldout_pose_rms_mps2[i]);
+  }
+  return decision;
 }
 
 Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& outcome,
@@ -203,7 +217,6 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
   CalibrationOutcome outcome;
   outcome.calibration = calibrate_job(job);
   const Calibration& calibration = outcome.calibration;
-  outcome.calibration.decision = stated_decision(calibration.decision, job.events);
   if (auto good = check_observable(calibration.observability, job.source, job.run.poses.size());
       !good) {
     return fail(good.error());
@@ -214,7 +227,9 @@ Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesys
   if (!job.verification.poses.empty()) {
     outcome.verification = evaluate(certified_model(calibration, job.own_effects), job.verification,
                                     job.description, BetweenSets::nowhere);
+    outcome.calibration.decision = with_fresh_poses(calibration, *outcome.verification);
   }
+  outcome.calibration.decision = stated_decision(calibration.decision, job.events);
 
   if (auto done = write_results(job, outcome, *folder); !done) return fail(done.error());
   if (separating_steps(outcome.calibration.diagnosis, 1).empty()) {

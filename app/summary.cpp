@@ -120,8 +120,19 @@ std::string conclusion(const RunDescription& description, const Calibration& cal
   std::string text = unit_name(description) + " " + verdict_words(calibration);
   if (verification) {
     const auto& errors = verification->after.pose_max_abs_mps2;
-    text += fmt::format("; {} confirm it to {} m/s²", counted(verification->poses, "fresh pose"),
-                        significant(*std::max_element(errors.begin(), errors.end()), 2));
+    const std::string poses = counted(verification->poses, "fresh pose");
+    const char* one = verification->poses == 1 ? "s" : "";
+    const double largest_mps2 = *std::max_element(errors.begin(), errors.end());
+    if (const auto axis = contradicted_axis(calibration, *verification)) {
+      text += fmt::format(
+          "; but {} do{} not confirm it: {} axis {} m/s² rms where the noise alone would leave "
+          "{}, largest error {} m/s²",
+          poses, *one == 0 ? "" : "es", kAxisName[*axis],
+          significant(verification->after.pose_rms_mps2[*axis], 2),
+          significant(calibration.floor_pose_rms_mps2[*axis], 2), significant(largest_mps2, 2));
+    } else {
+      text += fmt::format("; {} confirm{} it to {} m/s²", poses, one, significant(largest_mps2, 2));
+    }
   }
   const Decision& decision = calibration.decision;
   if (decision.status != DecisionStatus::none) {
@@ -157,6 +168,20 @@ std::string summary(const RunDescription& description, const Calibration& calibr
   return text + conclusion(description, calibration, verification) + "\n";
 }
 
+std::string caution(const std::vector<std::string>& lacking,
+                    const std::vector<std::string>& left_out) {
+  if (lacking.empty()) return {};
+  return fmt::format("caution: the readings have no {}; left out: {}", fmt::join(lacking, ", "),
+                     fmt::join(left_out, ", "));
+}
+
+std::string caution(const BeyondRange& column) {
+  return fmt::format("caution: {} from {} to {}, calibrated from {} to {} ({} beyond)",
+                     column.seen.column, significant(column.seen.low, 4),
+                     significant(column.seen.high, 4), significant(column.calibrated.low, 4),
+                     significant(column.calibrated.high, 4), counted(column.readings, "reading"));
+}
+
 std::string evaluation_summary(const Evaluation& evaluation, const std::optional<Limits>& limits) {
   std::string text = error_header();
   text += error_row("twelve parameters", evaluation.before.pose_rms_mps2);
@@ -178,6 +203,9 @@ std::string evaluation_summary(const Evaluation& evaluation, const std::optional
         "version found it: {}.\n",
         fmt::join(evaluation.left_out, ", "));
   }
+  if (auto lack = caution(evaluation.lacking, evaluation.left_out); !lack.empty())
+    text += lack + '\n';
+  for (const BeyondRange& column : evaluation.beyond) text += caution(column) + '\n';
   if (!evaluation.decided_otherwise.empty()) {
     text += fmt::format(
         "The calibration run left open which way the head goes; these poses tell: {}.\n",

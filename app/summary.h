@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "estimator/calibrate.h"
 
@@ -19,5 +20,11 @@ std::string conclusion(const RunDescription& description, const Calibration& cal
 
 /// Errors of both models on another set; the last line says whether the limit is kept.
 std::string evaluation_summary(const Evaluation& evaluation, const std::optional<Limits>& limits);
+
+/// For readings that a calibration is applied to; empty when nothing is lacking.
+std::string caution(const std::vector<std::string>& lacking,
+                    const std::vector<std::string>& left_out);
+/// "caution: temp_C from 60 to 85, calibrated from 18.2 to 25.4 (120 readings beyond)"
+std::string caution(const BeyondRange& column);
 
 }  // namespace plumbline::app

@@ -357,6 +357,7 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   result.poses = experiment.poses.size();
   result.samples = input.run.samples.size();
   result.skipped_rows = input.run.skipped_rows;
+  result.ranges = column_ranges(input.run.samples);
   result.observability = observability(experiment.A);
   if (result.observability.rank < 4) return result;
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "estimator/column_range.h"
 #include "estimator/effects/visit_log.h"
 #include "estimator/measurement.h"
 #include "estimator/noise/noise_model.h"
@@ -78,6 +79,7 @@ struct HeadReach {
   double delta_max_deg = 350;
   double h_min_deg = 0;
   double h_max_deg = 80;
+  bool is_limit = false;  ///< it must not go beyond; otherwise it is just where the run was
 };
 
 /// Poses that tell an effect from what could pass for it.
@@ -187,6 +189,15 @@ struct PoseResult {
   PerAxis<double> residual_after_mps2{};
 };
 
+/// One effect of the certified model, pose by pose, on the axis where it does most.
+struct FittedTerm {
+  std::string name;  ///< id of the effect; driver and shape of a structure without a name
+  std::size_t axis = 0;
+  std::string driver;             ///< the variable of which its values look most like a function
+  std::vector<double> at;         ///< of that, at every pose; angles in degrees
+  std::vector<double> term_mps2;  ///< what it adds, input-referred
+};
+
 /// Directions of the parameter space that the poses do not determine.
 struct Observability {
   int rank = 4;          ///< of the four columns [a_x a_y a_z 1]
@@ -221,6 +232,7 @@ struct Calibration {
   std::size_t poses = 0;
   std::size_t samples = 0;
   std::size_t skipped_rows = 0;
+  std::vector<ColumnRange> ranges;  ///< of the recorded columns
   PerAxis<NoiseModel> noise;
   PerAxis<std::optional<QuantizationUse>> quantization;  ///< nothing: steps do not matter
   ModelEstimates estimates;                              ///< the paper's 12-parameter model
@@ -235,6 +247,7 @@ struct Calibration {
   std::optional<UncertaintyReport> uncertainty;
   Decision decision;
   std::vector<PoseResult> pose_results;
+  std::vector<FittedTerm> fitted_terms;  ///< largest first
 };
 
 /// Identifies the noise, estimates the 12 parameters in three ways, tests the residual, decides.
@@ -258,6 +271,8 @@ struct Evaluation {
   /// What of it is not applied: it belonged to the run, needs a column that the set lacks, or is a
   /// term that this version does not have.
   std::vector<std::string> left_out;
+  std::vector<std::string> lacking;  ///< columns that the set lacks and effects need
+  std::vector<BeyondRange> beyond;   ///< columns that were elsewhere during the calibration
 };
 
 /// What of a calibration is needed to apply it to other data.
@@ -267,6 +282,7 @@ struct CertifiedModel {
   std::vector<FoundEffect> effects;
   std::vector<UnlistedStructure> unlisted;
   RunHistory history;                                           ///< of the calibration run
+  std::vector<ColumnRange> ranges = {};                         ///< of its recorded columns
   std::vector<std::shared_ptr<const Effect>> own_effects = {};  ///< that `effects` may name
 };
 CertifiedModel certified_model(const Calibration& calibration,
@@ -278,5 +294,10 @@ CertifiedModel certified_model(const Calibration& calibration,
 /// (Effect::left_open_by).
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
                     const RunDescription& description, std::optional<BetweenSets> head = {});
+
+/// The axis on which fresh poses are further off than the noise of a pose explains (by chance on
+/// one axis of 1000, the uncertainty of the noise included); nothing where they confirm the model.
+std::optional<std::size_t> contradicted_axis(const Calibration& calibration,
+                                             const Evaluation& verification);
 
 }  // namespace plumbline

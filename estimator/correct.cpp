@@ -24,8 +24,9 @@ bool can_be_computed(const Effect& effect) {
   // What came before a reading is not in the file: between two of them the triad may have been
   // anywhere.
   if (effect.remembers() || needs_a_head(effect.definition())) return false;
-  return effect.subject() == Subject::sensor && id != "env.base_field" &&
-         id != "adc.quantization" && id != "adc.mains_pickup";
+  // Of the two inputs that a stuck bit shows alike, one reading does not tell which it was.
+  return effect.subject() == Subject::sensor && !effect.of_the_room() && id != "adc.quantization" &&
+         id != "adc.stuck_bit" && id != "adc.mains_pickup";
 }
 
 /// Every reading as a visit of its own, at the angles under which a head would show its specific
@@ -86,6 +87,25 @@ Corrected correct_readings(const CertifiedModel& model, const SampleTable& readi
             readings.u_V[i][k] - predicted_V[i](static_cast<Eigen::Index>(k));
       a_g[k] += inverse.solve(off_V);
     }
+  }
+  result.lacking = restored.lacking;
+  result.beyond = beyond(model.ranges, readings);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto count = [](const auto& values, const auto& is_so) {
+      return static_cast<std::size_t>(std::count_if(values.begin(), values.end(), is_so));
+    };
+    // A head shows ±1 g; what is a little more may be noise.
+    constexpr double kMost_g = 1.1;
+    const auto axis = static_cast<Eigen::Index>(i);
+    result.beyond_1g[i] =
+        count(a_g, [&](const Eigen::Vector3d& a) { return std::abs(a(axis)) > kMost_g; });
+    if (!description.adc) continue;
+    const Adc& adc = *description.adc;
+    // The highest code stands a step below the end of the range; outputs are rounded.
+    const double near_V = 1.5 * adc.lsb_V();
+    result.at_rail[i] = count(readings.u_V[i], [&](double u_V) {
+      return u_V <= adc.min_V + 0.5 * adc.lsb_V() || u_V >= adc.max_V - near_V;
+    });
   }
   result.a_mps2.reserve(a_g.size());
   for (const Eigen::Vector3d& a : a_g) result.a_mps2.push_back(kStandardGravity_mps2 * a);

@@ -1,4 +1,5 @@
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "estimator/diagnosis/restored_model.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
+#include "estimator/noise/chi_squared.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
@@ -32,7 +34,7 @@ EvaluationFigures figures(const TriadEstimate& model, const PerAxis<Eigen::Vecto
 /// The certified model on another set.
 struct Applied {
   EvaluationFigures figures;
-  std::vector<std::string> left_out, decided_otherwise;
+  std::vector<std::string> left_out, lacking, decided_otherwise;
 };
 
 /// Sum over the axes.
@@ -51,7 +53,8 @@ Applied apply(const CertifiedModel& model, const MeasurementSet& set, VisitLog l
     for (Eigen::VectorXd& axis : predicted_V) axis = axis.tail(std::ssize(poses)).eval();
     return figures(model.final, predicted_V, set, poses);
   };
-  Applied best{with(restored.parameters), std::move(restored.left_out), {}};
+  Applied best{
+      with(restored.parameters), std::move(restored.left_out), std::move(restored.lacking), {}};
   if (log.goes_as_commanded) return best;  // nothing of a rig of our own is open
   for (ActiveEffect& active : restored.parameters.effects) {
     for (const auto& other : active.effect->left_open_by(model.history, active.p)) {
@@ -77,6 +80,7 @@ CertifiedModel certified_model(const Calibration& calibration,
           .effects = calibration.diagnosis.effects,
           .unlisted = calibration.diagnosis.unlisted,
           .history = calibration.diagnosis.history,
+          .ranges = calibration.ranges,
           .own_effects = own_effects};
 }
 
@@ -86,6 +90,7 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   Evaluation result;
   result.poses = poses.size();
   result.samples = set.samples.size();
+  result.beyond = beyond(model.ranges, set.samples);
   const Eigen::MatrixXd A = design_matrix(poses, description.gravity);
   PerAxis<Eigen::VectorXd> twelve_V;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
@@ -108,8 +113,28 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   }
   result.after = applied.figures;
   result.left_out = std::move(applied.left_out);
+  result.lacking = std::move(applied.lacking);
   result.decided_otherwise = std::move(applied.decided_otherwise);
   return result;
+}
+
+std::optional<std::size_t> contradicted_axis(const Calibration& calibration,
+                                             const Evaluation& verification) {
+  constexpr double kByChance = 1e-3;
+  const auto poses = static_cast<double>(verification.poses);
+  const double allowed = std::sqrt(chi_squared_quantile(1 - kByChance, poses) / poses);
+  std::optional<std::size_t> worst;
+  double most = 1;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double expected_mps2 =
+        calibration.floor_pose_rms_mps2[i] + 2 * calibration.u_floor_pose_rms_mps2[i];
+    const double excess =
+        verification.after.pose_rms_mps2[i] / std::max(1e-300, allowed * expected_mps2);
+    if (excess <= most) continue;
+    most = excess;
+    worst = i;
+  }
+  return worst;
 }
 
 }  // namespace plumbline

@@ -117,20 +117,25 @@ std::string finding(const Composer& c) {
 
 std::string error_sentence(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
-  const auto worst = [](const PerAxis<double>& v) { return *std::max_element(v.begin(), v.end()); };
-  const double floor = worst(calibration.floor_pose_rms_mps2);
-  const double after = worst(calibration.after.heldout_pose_rms_mps2);
+  const PerAxis<double>& error = calibration.before.heldout_pose_rms_mps2;
+  // One axis throughout: the one that stood out most before anything was added.
+  std::size_t axis = 0;
+  for (std::size_t i = 1; i < kAxisCount; ++i) {
+    const PerAxis<double>& floor = calibration.floor_pose_rms_mps2;
+    if (error[i] * floor[axis] > error[axis] * floor[i]) axis = i;
+  }
+  const double floor = calibration.floor_pose_rms_mps2[axis];
+  const double after = calibration.after.heldout_pose_rms_mps2[axis];
   if (!calibration.diagnosis.enlarges_model()) {
     return c.tr(
-        "Error of a pose that took no part in the fit: {} mm/s² RMS on the worst axis, where the "
+        "Error of a pose that took no part in the fit: {} mm/s² RMS on the {} axis, where the "
         "noise alone would leave {} mm/s².",
-        milli_mps2(after), milli_mps2(floor));
+        milli_mps2(after), kAxisName[axis], milli_mps2(floor));
   }
   return c.tr(
-      "Error of a pose that took no part in the fit, worst axis: {} mm/s² RMS before, {} mm/s² "
+      "Error of a pose that took no part in the fit, {} axis: {} mm/s² RMS before, {} mm/s² "
       "after the added effects; the noise alone would leave {} mm/s².",
-      milli_mps2(worst(calibration.before.heldout_pose_rms_mps2)), milli_mps2(after),
-      milli_mps2(floor));
+      kAxisName[axis], milli_mps2(error[axis]), milli_mps2(after), milli_mps2(floor));
 }
 
 void add_summary(const Composer& c) {
@@ -148,6 +153,15 @@ void add_summary(const Composer& c) {
   document.summary.push_back(finding(c));
   document.summary.push_back(c.input.scalar != nullptr ? scalar_error_sentence(c)
                                                        : error_sentence(c));
+  const Evaluation* fresh = c.input.verification;
+  if (const auto axis = fresh == nullptr ? std::nullopt : contradicted_axis(calibration, *fresh)) {
+    document.tone = Tone::warning;
+    document.summary.push_back(
+        c.tr("The fresh verification poses do not confirm the model: {} mm/s² RMS on the {} axis, "
+             "where the noise alone would leave {} mm/s².",
+             milli_mps2(fresh->after.pose_rms_mps2[*axis]), kAxisName[*axis],
+             milli_mps2(calibration.floor_pose_rms_mps2[*axis])));
+  }
   if (c.input.verification != nullptr) {
     const auto worst = [](const PerAxis<double>& v) {
       return *std::max_element(v.begin(), v.end());
@@ -162,13 +176,15 @@ void add_summary(const Composer& c) {
 
 void add_figures(const Composer& c) {
   c.add(Heading{c.tr("Pictures of the residual")});
+  const std::size_t last = c.calibration->fitted_terms.empty() ? 3 : 4;
   c.add(Paragraph{
       c.tr("Figures {} to {}: what the model leaves of every pose, measured less calculated and "
            "referred to the input.",
-           c.figures() + 1, c.figures() + 3)});
+           c.figures() + 1, c.figures() + last)});
   const FigureContext context{c.calibration, c.tr};
   c.add(residual_map(context, c.input.description.grid));
   c.add(residual_histogram(context));
+  if (auto figure = fitted_terms_figure(context)) c.add(*std::move(figure));
   c.add(residual_course(context));
 }
 

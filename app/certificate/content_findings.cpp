@@ -9,6 +9,7 @@
 #include "app/certificate/figures.h"
 #include "app/certificate/rounding.h"
 #include "estimator/decision.h"
+#include "estimator/noise/chi_squared.h"
 
 namespace plumbline::app::content {
 namespace {
@@ -111,11 +112,19 @@ struct NotFound {
   std::string unit;
 };
 
+/// Whether it may be there in the place of something that was found.
+bool is_alternative(const std::string& id, const Diagnosis& diagnosis) {
+  for (const auto& [name, ambiguity] : diagnosis.findings())
+    for (const std::string& sum : ambiguity.alternatives)
+      if (("+" + sum + "+").find("+" + id + "+") != std::string::npos) return true;
+  return false;
+}
+
 /// One row for each parameter: the largest limit of the axes that show the effect at all.
 std::vector<NotFound> not_found_rows(const Diagnosis& diagnosis) {
   std::vector<NotFound> rows;
   for (const DetectionLimit& limit : diagnosis.not_found) {
-    if (!std::isfinite(limit.limit)) continue;
+    if (!std::isfinite(limit.limit) || is_alternative(limit.id, diagnosis)) continue;
     auto row = std::find_if(rows.begin(), rows.end(), [&](const NotFound& r) {
       return r.id == limit.id && r.parameter == limit.parameter && r.unit == limit.unit;
     });
@@ -131,7 +140,9 @@ void add_not_found(const Composer& c) {
   const std::vector<NotFound> rows = not_found_rows(c.input.calibration.diagnosis);
   if (rows.empty()) return;
   Table table;
-  table.caption = c.tr("Looked for and not found: an effect of this size would have been seen");
+  table.caption = c.tr(
+      "Looked for and not found: the size that would stand out by five standard deviations (an "
+      "effect of 1.6 times that size is found as a rule)");
   table.header = {c.tr("effect"), c.tr("axes"), c.tr("parameter"), c.tr("detection limit")};
   table.word_columns = {1, 2};
   for (const NotFound& item : rows) {
@@ -143,14 +154,84 @@ void add_not_found(const Composer& c) {
   c.add(std::move(table));
 }
 
+/// Share of the poses that say something of the RMS which the others do not: residuals that follow
+/// each other alike are fewer (Bartlett 1946; what noise alone makes of each term taken off).
+double independent_share(const std::vector<PoseResult>& poses, std::size_t axis) {
+  constexpr std::size_t kMostLags = 30;
+  const auto residual = [&](std::size_t k) { return poses[k].residual_after_mps2[axis]; };
+  const auto n = static_cast<double>(poses.size());
+  double square = 0, inflation = 1;
+  for (std::size_t k = 0; k < poses.size(); ++k) square += residual(k) * residual(k);
+  for (std::size_t lag = 1; square > 0 && lag <= kMostLags && 4 * lag < poses.size(); ++lag) {
+    double product = 0;
+    for (std::size_t k = lag; k < poses.size(); ++k) product += residual(k) * residual(k - lag);
+    inflation += 2 * std::max(0.0, product * product / (square * square) - 1 / n);
+  }
+  return 1 / inflation;
+}
+
+/// "17.0 … 20.1": 95 % limits of an RMS over so many poses, and of the largest of them where they
+/// are normally distributed with that RMS.
+std::string limits_text(double low_mps2, double high_mps2) {
+  return milli_mps2(low_mps2) + " … " + milli_mps2(high_mps2);
+}
+std::string rms_limits(double rms_mps2, double dof) {
+  const auto limit = [&](double p) {
+    return rms_mps2 * std::sqrt(dof / chi_squared_quantile(p, dof));
+  };
+  return limits_text(limit(0.975), limit(0.025));
+}
+std::string largest_limits(double rms_mps2, double poses) {
+  const auto limit = [&](double p) {
+    return rms_mps2 * std::sqrt(chi_squared_quantile(std::pow(p, 1 / poses), 1));
+  };
+  return limits_text(limit(0.025), limit(0.975));
+}
+
+void add_limits(const Composer& c) {
+  const Calibration& calibration = c.input.calibration;
+  const bool both = calibration.diagnosis.enlarges_model();
+  Table table;
+  table.caption = c.tr("95 % confidence limits of these errors, mm/s²");
+  table.header = {c.tr("quantity"), "x", "y", "z"};
+  const auto rows = [&](const std::string& label, const PerAxis<double>& rms, std::size_t poses) {
+    std::vector<std::string> of_rms = {c.tr("RMS, {}", label)},
+                             of_largest = {c.tr("largest at that RMS, {}", label)};
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const auto n = static_cast<double>(poses);
+      of_rms.push_back(
+          rms_limits(rms[i], std::max(1.0, n * independent_share(calibration.pose_results, i))));
+      of_largest.push_back(largest_limits(rms[i], n));
+    }
+    table.rows.push_back(std::move(of_rms));
+    table.rows.push_back(std::move(of_largest));
+  };
+  const std::string before = c.tr(", before"), after = both ? c.tr(", after") : "";
+  const std::string left_out = c.tr("poses left out of the fit");
+  if (both) rows(left_out + before, calibration.before.heldout_pose_rms_mps2, calibration.poses);
+  rows(left_out + after, calibration.after.heldout_pose_rms_mps2, calibration.poses);
+  if (const Evaluation* v = c.input.verification; v != nullptr) {
+    const std::string fresh = c.tr("fresh verification poses");
+    if (both) rows(fresh + before, v->before.pose_rms_mps2, v->poses);
+    rows(fresh + after, v->after.pose_rms_mps2, v->poses);
+  }
+  c.add(std::move(table));
+  c.add(Paragraph{c.tr("Of an RMS: by the χ² distribution, with the poses counted that are "
+                       "independent of those before them. Of the largest: where it lies if the "
+                       "errors are normally distributed with that RMS; one far above it stands for "
+                       "more than noise."),
+                  Tone::note});
+}
+
 }  // namespace
 
 void add_errors(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
-  c.add(Heading{c.tr("Error before and after the added effects")});
+  const bool both = calibration.diagnosis.enlarges_model();
+  c.add(Heading{both ? c.tr("Error before and after the added effects")
+                     : c.tr("Error of the calibrated model")});
   Table table;
   table.caption = c.tr("Input-referred errors, mm/s²");
-  const bool both = calibration.diagnosis.enlarges_model();
   table.header = {c.tr("quantity")};
   for (const char* axis : kAxisName) {
     if (both) {
@@ -188,6 +269,7 @@ void add_errors(const Composer& c) {
   row(c.tr("standard uncertainty of the expected RMS"), calibration.u_floor_pose_rms_mps2,
       calibration.u_floor_pose_rms_mps2);
   c.add(std::move(table));
+  if (calibration.poses > 0) add_limits(c);
   if (!both) return;
   c.add(Paragraph{c.tr("Before: with the twelve parameters alone. After: with the added effects as "
                        "well. The calibration adjusts nothing at the unit itself."),

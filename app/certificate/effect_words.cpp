@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "app/certificate/rounding.h"
@@ -131,17 +132,30 @@ std::string before_unit(const std::string& unit) { return unit.empty() || unit =
 std::string parameter_text(const EffectParameter& parameter) {
   std::string text = parameter.name;
   if (parameter.axis) text += fmt::format(" ({})", kAxisName.at(*parameter.axis));
-  const std::string unit = printed_unit(parameter.unit);
+  // Angles of the head are stated in degrees throughout.
+  const bool in_rad = parameter.unit == "rad";
+  const std::string unit = in_rad ? "°" : printed_unit(parameter.unit);
+  const double factor = in_rad ? 180 / std::numbers::pi : 1;
+  const double value = factor * parameter.value;
   text += " = ";
   if (parameter.u > 0) {
-    const RoundedResult rounded = round_result(parameter.value, 2 * parameter.u);
+    const RoundedResult rounded = round_result(value, 2 * factor * parameter.u);
     text +=
         fmt::format("({} ± {}){}{}", rounded.value, rounded.uncertainty, before_unit(unit), unit);
-  } else if (parameter.value == std::round(parameter.value) && std::abs(parameter.value) < 1e6) {
-    text += fmt::format("{:.0f}", parameter.value);  // a pose, a bit, an order
+  } else if (value == std::round(value) && std::abs(value) < 1e6) {
+    text += fmt::format("{:.0f}", value);  // a pose, a bit, an order
     text += before_unit(unit) + unit;
   } else {
-    text += chosen(parameter.value, 6) + before_unit(unit) + unit;
+    text += chosen(value, 6) + before_unit(unit) + unit;
+  }
+  return text;
+}
+
+std::string shortened(const std::string& text, std::size_t most) {
+  std::size_t count = 0;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    if ((text[at] & 0xC0) == 0x80) continue;
+    if (++count == most) return text.substr(0, at) + "…";
   }
   return text;
 }

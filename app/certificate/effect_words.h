@@ -24,6 +24,9 @@ std::string printed_unit(std::string unit);
 /// What stands between a value and its printed unit: nothing before ° and where there is none.
 std::string before_unit(const std::string& unit);
 
+/// At most `most` characters; a picture cannot wrap.
+std::string shortened(const std::string& text, std::size_t most);
+
 /// The term of an effect as a formula with its parameters ("k2·a_i²"), members of a sum one by one;
 /// empty for what has none.
 std::string effect_term(const std::string& id, const Translator& tr);

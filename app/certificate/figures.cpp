@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 
+#include "app/certificate/effect_words.h"
 #include "app/figure/plot.h"
 
 namespace plumbline::app {
@@ -54,6 +55,8 @@ double largest_residual(const Calibration& calibration, bool before_too) {
   }
   return largest;
 }
+
+constexpr std::size_t kLongestTitle = 36;  ///< characters over a panel
 
 double span_or(double step, double fallback) { return step > 0 ? step : fallback; }
 
@@ -249,6 +252,50 @@ Figure residual_course(const FigureContext& context) {
                  temperature, y);
       other.draw_frame();
       other.points(temp_C, residual, 1.6, kAxisColor[i]);
+    }
+  };
+  return figure;
+}
+
+std::optional<Figure> fitted_terms_figure(const FigureContext& context) {
+  constexpr std::size_t kMost = 6, kColumns = 2;
+  constexpr double kPanelWidth = 270, kPanelHeight = 120, kStepX = 345, kStepY = 188, kTop = 26;
+  const std::size_t count = std::min(kMost, context.calibration->fitted_terms.size());
+  if (count == 0) return std::nullopt;
+  Figure figure;
+  figure.caption = context.tr(
+      "Residual with one added effect left out of the model (coloured) and the fitted term of that "
+      "effect (black), against the recorded variable that shows it best; the axis on which it is "
+      "largest.");
+  figure.description = context.tr("Residuals against the driver of each added effect");
+  figure.width = kFigureWidth;
+  figure.height = kTop + static_cast<double>((count + kColumns - 1) / kColumns) * kStepY - 14;
+  figure.draw = [context, count](Canvas& canvas) {
+    const Calibration& calibration = *context.calibration;
+    for (std::size_t k = 0; k < count; ++k) {
+      const FittedTerm& term = calibration.fitted_terms[k];
+      std::vector<double> residual;
+      double largest = 0;
+      for (std::size_t p = 0; p < term.term_mps2.size(); ++p) {
+        residual.push_back(term.term_mps2[p] +
+                           calibration.pose_results[p].residual_after_mps2[term.axis]);
+        largest = std::max({largest, std::abs(residual[p]), std::abs(term.term_mps2[p])});
+      }
+      const auto [low, high] = std::minmax_element(term.at.begin(), term.at.end());
+      const double margin = 0.03 * std::max(*high - *low, 1e-9);
+      PlotAxis x{term.driver, *low - margin, *high + margin};
+      x.ticks = 6;
+      PlotAxis y{k % kColumns == 0 ? context.tr("residual, m/s²") : "", -nice_ceiling(largest),
+                 nice_ceiling(largest)};
+      y.ticks = 4;
+      Plot plot(canvas,
+                {60 + static_cast<double>(k % kColumns) * kStepX,
+                 kTop + static_cast<double>(k / kColumns) * kStepY},
+                kPanelWidth, kPanelHeight, x, y);
+      plot.draw_frame(context.tr("{} axis", kAxisName[term.axis]) + ": " +
+                      shortened(term.name, kLongestTitle));
+      plot.points(term.at, residual, 1.6, kAxisColor[term.axis]);
+      plot.points(term.at, term.term_mps2, 1.0, palette::kBlack);
     }
   };
   return figure;

@@ -24,6 +24,9 @@ Figure residual_map(const FigureContext& context, const Grid& grid);
 Figure residual_histogram(const FigureContext& context);
 /// Residual against the time of the run, and against temperature when it was recorded.
 Figure residual_course(const FigureContext& context);
+/// What the residual would be without each added effect, against the variable that shows it best,
+/// with the fitted term; the largest six. Nothing when no effect was added.
+std::optional<Figure> fitted_terms_figure(const FigureContext& context);
 /// Overlapping Allan deviation of each output with the fitted terms.
 Figure allan_figure(const FigureContext& context);
 /// Estimates of the twelve parameters against the number of positions, three estimators.

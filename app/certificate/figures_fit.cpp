@@ -206,16 +206,6 @@ struct Candidate {
   bool added = false;
 };
 
-/// At most `most` characters; a picture cannot wrap.
-std::string shortened(const std::string& text, std::size_t most) {
-  std::size_t count = 0;
-  for (std::size_t at = 0; at < text.size(); ++at) {
-    if ((text[at] & 0xC0) == 0x80) continue;
-    if (++count == most) return text.substr(0, at) + "…";
-  }
-  return text;
-}
-
 /// All that were added to the model, then the strongest of the listed ones that were not, up to
 /// ten.
 std::vector<Candidate> strongest_candidates(const Diagnosis& diagnosis, const Translator& tr) {

@@ -25,6 +25,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"go on", "продовження"},
     {"resume", "відновлення"},
     {"separate", "розрізнення"},
+    {"found so far", "знайдено досі"},
     {"bus", "шина"},
     {"incomplete", "не завершено"},
     {"soak", "витримка"},
@@ -162,6 +163,9 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"tilt (h)", "нахилу (h)"},
     {"{} axis: {}", "вісь {}: {}"},
     {"{} unit {}: {}", "{}, пристрій {}: {}"},
+    // --- what was found before further poses ---
+    {"{}, or {}: {}", "{}, або {}: {}"},
+    {"{}, or {}", "{}, або {}"},
     // clang-format on
 };
 

@@ -10,6 +10,7 @@
 #include "app/io/csv.h"
 #include "app/io/files.h"
 #include "app/io/result_json.h"
+#include "app/summary.h"
 #include "estimator/correct.h"
 
 namespace plumbline::app {
@@ -24,6 +25,27 @@ struct CorrectOptions {
   std::string columns = "x=ux_V,y=uy_V,z=uz_V";
   bool skip_bad_rows = false;
 };
+
+/// What the reader of corrected readings has to know, one line each.
+std::vector<std::string> cautions_of(const Corrected& corrected, std::size_t skipped_rows) {
+  std::vector<std::string> cautions;
+  if (skipped_rows > 0)
+    cautions.push_back(
+        fmt::format("{} bad {} skipped", skipped_rows, skipped_rows == 1 ? "row" : "rows"));
+  if (auto text = caution(corrected.lacking, corrected.left_out); !text.empty())
+    cautions.push_back(std::move(text));
+  for (const BeyondRange& column : corrected.beyond) cautions.push_back(caution(column));
+  const auto per_axis = [&](const PerAxis<std::size_t>& counts, const char* what) {
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      if (counts[i] == 0) continue;
+      cautions.push_back(fmt::format("caution: {} axis: {} {} {}", kAxisName[i], counts[i],
+                                     counts[i] == 1 ? "reading" : "readings", what));
+    }
+  };
+  per_axis(corrected.at_rail, "at an end of the converter's range or beyond it");
+  per_axis(corrected.beyond_1g, "beyond ±1 g, where the unit was not calibrated");
+  return cautions;
+}
 
 Result<ExitCode> run_correct(const CorrectOptions& options) {
   const auto description = read_run_description(options.config);
@@ -40,6 +62,13 @@ Result<ExitCode> run_correct(const CorrectOptions& options) {
   if (!columns) return fail(columns.error());
   if (columns->size() != kAxisCount)
     return fail(ErrorCode::input, "--columns: a correction needs all three axes");
+  for (std::size_t i = 1; i < kAxisCount; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if ((*columns)[i].column == (*columns)[j].column)
+        return fail(ErrorCode::input,
+                    fmt::format("--columns: {} cannot be two axes", (*columns)[i].column));
+    }
+  }
   CsvOptions csv{.skip_bad_rows = options.skip_bad_rows, .angle_free = true};
   for (const AxisColumn& column : *columns) {
     for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -52,9 +81,11 @@ Result<ExitCode> run_correct(const CorrectOptions& options) {
   const Corrected corrected = correct_readings(calibration->model, readings->samples, *description);
   const std::string applied = fmt::format("{}", fmt::join(corrected.applied, ", "));
   const std::string left_out = fmt::format("{}", fmt::join(corrected.left_out, ", "));
+  const std::vector<std::string> cautions = cautions_of(corrected, readings->skipped_rows);
   std::string text =
       fmt::format("# specific force in the frame of the triad; effects applied: {}; left out: {}\n",
                   applied.empty() ? "none" : applied, left_out.empty() ? "none" : left_out);
+  for (const std::string& caution : cautions) text += "# " + caution + '\n';
   text += "t_s,ax_mps2,ay_mps2,az_mps2\n";
   for (std::size_t k = 0; k < corrected.a_mps2.size(); ++k) {
     const Eigen::Vector3d& a = corrected.a_mps2[k];
@@ -65,8 +96,7 @@ Result<ExitCode> run_correct(const CorrectOptions& options) {
   std::cout << fmt::format("{} readings corrected; effects applied: {}; left out: {}\n",
                            corrected.a_mps2.size(), applied.empty() ? "none" : applied,
                            left_out.empty() ? "none" : left_out);
-  if (readings->skipped_rows > 0)
-    std::cout << fmt::format("{} bad rows skipped\n", readings->skipped_rows);
+  for (const std::string& caution : cautions) std::cout << caution << '\n';
   return ExitCode::done;
 }
 
@@ -92,7 +122,11 @@ void add_correct(CLI::App& program, Invocation& invocation) {
                 "Skip and count rows that cannot be used, instead of refusing the file");
   sub->footer(
       "Effects of the head and the base, of what came before a reading and of one run are left "
-      "out; which ones, the first line of the file says.\n"
+      "out; which ones, the first line of the file says. Lines after it that begin with # say what "
+      "else "
+      "to know: a column that is lacking or lies beyond the calibrated range, readings at an end "
+      "of "
+      "the converter's range or beyond ±1 g.\n"
       "Exit codes: 0 done; 2 wrong use; 4 internal error.");
   sub->callback(
       [&invocation, options] { invocation.action = [options] { return run_correct(*options); }; });

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "app/calibration_job.h"
+#include "app/config/own_effects.h"
 #include "app/provenance.h"
 #include "app/sequencer/control_socket.h"
 #include "app/sequencer/live_state.h"
@@ -77,6 +78,18 @@ class OrdersBySignal {
   std::array<struct sigaction, kOrders.size()> before_{};
 };
 
+/// Whether the file can be read and asks for nothing that this rig does not record.
+Result<void> check_own_effects(const std::filesystem::path& path, const RigDescription& rig) {
+  if (path.empty()) return {};
+  const auto effects = read_own_effects(path, rig.run.reference_C);
+  if (!effects) return fail(effects.error());
+  SampleTable recorded;
+  recorded.temp_C = {rig.run.reference_C};
+  for (const rig::CovariateSignal& signal : rig.sensor.covariates)
+    recorded.covariates.push_back({signal.column, {}});
+  return check_columns(*effects, recorded);
+}
+
 Result<ExitCode> calibrate_run(const MeasureRequest& request, storage::RunId run,
                                std::string& sentence) {
   auto job = job_from_database(request.session.database, run, request.seed);
@@ -91,20 +104,27 @@ Result<ExitCode> calibrate_run(const MeasureRequest& request, storage::RunId run
 }
 
 /// What the poses so far leave open and further ones would decide.
-Result<std::vector<PlanStep>> poses_that_decide(const MeasureRequest& request, storage::RunId run) {
+Result<FurtherSteps> poses_that_decide(const MeasureRequest& request, storage::RunId run) {
   auto job = job_from_database(request.session.database, run, request.seed);
   if (!job) return fail(job.error());
   if (auto added = add_own_effects(request.effects, *job); !added) return fail(added.error());
   const Calibration calibration = calibrate_job(*job);
-  auto steps = separating_steps(calibration.diagnosis, request.session.rig.plan.samples_per_pose);
+  FurtherSteps further{
+      separating_steps(calibration.diagnosis, request.session.rig.plan.samples_per_pose)};
+  const std::vector<PlanStep>& steps = further.steps;
   for (const auto& [name, ambiguity] : calibration.diagnosis.findings()) {
-    if (!ambiguity.separate_by.empty()) fmt::print(stderr, "{}: {}\n", name, ambiguity.separate_by);
+    std::string reason = name;
+    if (!ambiguity.alternatives.empty())
+      reason += fmt::format(", or {}", fmt::join(ambiguity.alternatives, ", or "));
+    if (!ambiguity.separate_by.empty()) reason += ": " + ambiguity.separate_by;
+    fmt::print(stderr, "{}\n", reason);
+    further.reasons.push_back(std::move(reason));
   }
   fmt::print(stderr, "separate: {}\n",
              steps.empty() ? std::string("no further poses are needed, or none would decide")
                            : fmt::format("{} further {} in the same run", steps.size(),
                                          steps.size() == 1 ? "pose" : "poses"));
-  return steps;
+  return further;
 }
 
 std::string chain_head_of(const std::filesystem::path& database, storage::RunId run) {
@@ -206,6 +226,9 @@ Result<storage::RunId> measure(const MeasureRequest& request, LiveState& live, N
 }
 
 Result<ExitCode> measure_and_calibrate(const MeasureRequest& request) {
+  // Refused before the hours of measuring, not after them.
+  if (auto good = check_own_effects(request.effects, request.session.rig); !good)
+    return fail(good.error());
   LiveState live(live_run(request));
   Notifier notifier(request.notify, live);
   ExitSummary summary;

@@ -112,6 +112,7 @@ class OwnEffect final : public Effect {
     columns_ = first->column_name;
     within_dwell_ = first->uses(kTimeInPose);
     uses_temperature_ = first->uses(kTemperature);
+    uses_own_axis_ = first->uses(kA) || first->uses(kPrevA);
     for (std::size_t v = kPrevDelta; v < kVariables; ++v)
       remembers_ |= first->uses(static_cast<Variable>(v));
     idle_.push_back(std::move(first));
@@ -162,19 +163,26 @@ class OwnEffect final : public Effect {
   }
   bool remembers() const override { return remembers_; }
   std::string definition() const override;
-  const std::vector<std::string>& columns() const { return columns_; }
-  bool uses_temperature() const { return uses_temperature_; }
+  std::vector<std::string> columns() const override {
+    std::vector<std::string> all = columns_;
+    if (uses_temperature_) all.emplace_back(kTemperatureColumn);
+    return all;
+  }
 
-  /// The value for made-up surroundings, number `which` of several; amplitudes as they are or zero.
-  double trial(int which, bool with_amplitudes) const {
+  bool uses_own_axis() const { return uses_own_axis_; }
+  /// Where a search starts.
+  std::vector<double> start() const {
+    std::vector<double> p;
+    for (const Parameter& parameter : description_.parameters)
+      p.push_back(parameter.starts.front());
+    return p;
+  }
+  /// The value for made-up surroundings, number `which` of several.
+  double trial(int which, const std::vector<double>& p) const {
     Evaluator evaluator(description_);
     for (std::size_t v = 0; v < kVariables; ++v)
       evaluator.variable[v] = 0.3 + 0.37 * which + 0.11 * static_cast<double>(v);
-    for (std::size_t k = 0; k < evaluator.parameter.size(); ++k) {
-      const Parameter& p = description_.parameters[k];
-      const bool amplitude = p.info.role == ParameterRole::amplitude;
-      evaluator.parameter[k] = amplitude && !with_amplitudes ? 0 : p.starts.front();
-    }
+    std::copy(p.begin(), p.end(), evaluator.parameter.begin());  // the parser looks there
     for (double& column : evaluator.column) column = 1 + 0.1 * which;
     return evaluator.parser.Eval();
   }
@@ -217,11 +225,8 @@ class OwnEffect final : public Effect {
     return log.visits[visit].t_mean_s - log.visits[visit].t_arrival_s;
   }
   bool can_be_shown(const VisitLog& log, std::size_t axis) const {
-    if (uses_temperature_ && !log.has_temperature) return false;
-    for (const std::string& column : columns_)
-      if (std::find(log.covariate_names.begin(), log.covariate_names.end(), column) ==
-          log.covariate_names.end())
-        return false;
+    for (const std::string& column : columns())
+      if (!log.has_column(column)) return false;
     return subject() == Subject::head ||
            std::find(description_.axes.begin(), description_.axes.end(), axis) !=
                description_.axes.end();
@@ -302,6 +307,7 @@ class OwnEffect final : public Effect {
   std::vector<std::string> columns_;
   bool within_dwell_ = false;
   bool uses_temperature_ = false;
+  bool uses_own_axis_ = false;
   bool remembers_ = false;
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<Evaluator>> idle_;
@@ -383,11 +389,26 @@ std::string fault_of(const OwnEffect& effect) {
   if (std::none_of(infos.begin(), infos.end(),
                    [](const ParameterInfo& info) { return info.role == ParameterRole::amplitude; }))
     return "has no parameter of kind \"amplitude\"";
+  if (effect.subject() == Subject::head && effect.uses_own_axis())
+    return "uses the specific force of one axis; the head is the same for all (a_x, a_y, a_z)";
   constexpr int kTrials = 3;
+  const std::vector<double> start = effect.start();
+  std::vector<double> none = start;
+  for (std::size_t k = 0; k < infos.size(); ++k)
+    if (infos[k].role == ParameterRole::amplitude) none[k] = 0;
   for (int which = 0; which < kTrials; ++which) {
-    const double without = effect.trial(which, false);
+    const double without = effect.trial(which, none);
     if (std::abs(without) > 1e-12)
       return fmt::format("is {:.3g} instead of zero where all amplitudes are zero", without);
+  }
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    if (infos[k].role != ParameterRole::amplitude) continue;
+    std::vector<double> twice = start;
+    twice[k] *= 2;
+    bool matters = false;
+    for (int which = 0; which < kTrials; ++which)
+      matters = matters || effect.trial(which, twice) != effect.trial(which, start);
+    if (!matters) return fmt::format("does not depend on {}", infos[k].name);
   }
   return {};
 }
@@ -461,18 +482,19 @@ Result<OwnEffects> parse_own_effects(std::string_view text, const std::string& n
 
 Result<void> check_columns(const OwnEffects& effects, const SampleTable& samples) {
   std::vector<std::string> known = strings(kVariableName);
+  if (samples.temp_C.empty()) std::erase(known, kTemperatureColumn);
   for (const Covariate& column : samples.covariates) known.push_back(column.name);
   for (const auto& effect : effects) {
-    const auto& own = static_cast<const OwnEffect&>(*effect);
-    if (own.uses_temperature() && samples.temp_C.empty())
-      return fail(ErrorCode::input, own.id() + ": needs temp_C, which the samples do not have");
-    for (const std::string& column : own.columns()) {
+    for (const std::string& column : effect->columns()) {
       if (std::find(known.begin(), known.end(), column) != known.end()) continue;
+      if (column == kTemperatureColumn)
+        return fail(ErrorCode::input,
+                    effect->id() + ": needs temp_C, which the samples do not have");
       const std::string near = rig::nearest(column, known);
       return fail(ErrorCode::input,
                   fmt::format("{}: {} is neither a parameter nor a variable nor a column of the "
                               "samples{}",
-                              own.id(), column,
+                              effect->id(), column,
                               near.empty() ? "" : fmt::format("; did you mean {}?", near)));
     }
   }

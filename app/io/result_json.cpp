@@ -66,6 +66,13 @@ Json quantization_json(const Calibration& calibration) {
   });
 }
 
+Json ranges_json(const std::vector<ColumnRange>& ranges) {
+  Json json = Json::object();
+  for (const ColumnRange& range : ranges)
+    json[range.column] = json_numbers({range.low, range.high});
+  return json;
+}
+
 }  // namespace
 
 Json result_json(const Calibration& calibration, const Provenance& provenance) {
@@ -76,6 +83,7 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
            {{"poses", calibration.poses},
             {"samples", calibration.samples},
             {"skipped_rows", calibration.skipped_rows},
+            {"ranges", ranges_json(calibration.ranges)},
             {"axes", json_axis_names({0, 1, 2})},
             {"condition", json_number(calibration.observability.condition)}}},
           {"noise", json_per_axis([&](std::size_t axis) {

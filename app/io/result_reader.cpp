@@ -125,6 +125,10 @@ StoredCalibration stored_calibration(const Json& json, double reference_C) {
   }
   if (json.at("diagnosis").contains("history"))
     stored.model.history = run_history(json.at("diagnosis").at("history"));
+  if (json.contains("data") && json.at("data").contains("ranges")) {
+    for (const auto& [column, range] : json.at("data").at("ranges").items())
+      stored.model.ranges.push_back({column, range.at(0).get<double>(), range.at(1).get<double>()});
+  }
   const Json& dut = json.at("provenance").at("dut");
   stored.dut.serial = dut.at("serial").get<std::string>();
   stored.dut.model = dut.at("model").get<std::string>();

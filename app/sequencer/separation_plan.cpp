@@ -79,12 +79,13 @@ HeadReach reach_of(const RigDescription& rig) {
   const auto [delta_start, delta_stop] =
       std::minmax(rig.run.grid.delta.start_deg, rig.run.grid.delta.stop_deg);
   const auto [h_start, h_stop] = std::minmax(rig.run.grid.h.start_deg, rig.run.grid.h.stop_deg);
-  if (!rig.soft_limits) return {delta_start, delta_stop, h_start, h_stop};
+  if (!rig.soft_limits) return {delta_start, delta_stop, h_start, h_stop, true};
   const rig::SoftLimits& limits = *rig.soft_limits;
   return {.delta_min_deg = std::max(delta_start, limits.lower.delta_deg),
           .delta_max_deg = std::min(delta_stop, limits.upper.delta_deg),
           .h_min_deg = std::max(-kUpright_deg, limits.lower.h_deg),
-          .h_max_deg = std::min(kUpright_deg, limits.upper.h_deg)};
+          .h_max_deg = std::min(kUpright_deg, limits.upper.h_deg),
+          .is_limit = true};
 }
 
 std::vector<PlanStep> separating_steps(const Diagnosis& diagnosis, int samples_per_pose) {

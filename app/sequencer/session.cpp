@@ -26,6 +26,8 @@ struct Started {
 
 /// The event with which further poses begin.
 constexpr const char* kFurther = "separate";
+/// Those that say why.
+constexpr const char* kReason = "found so far";
 /// The one that says for which job of a queue a run was begun.
 constexpr const char* kJob = "job";
 
@@ -301,9 +303,10 @@ Plan lengthened(const Plan& plan, const std::vector<PlanStep>& steps, long long 
 
 /// Goes on with a run whose plan is done.
 Result<void> run_further(const SessionRequest& request, const Plan& plan, storage::RunId run,
-                         const std::vector<PlanStep>& steps, storage::RunStore& store,
+                         const FurtherSteps& further, storage::RunStore& store,
                          const EngineControl& control, const ProgressObserver& observer) {
   const RigDescription& rig = request.rig;
+  const std::vector<PlanStep>& steps = further.steps;
   auto taken = store.committed_poses(run);
   if (!taken) return fail(taken.error());
   const auto suspects = store.suspect_poses(run);
@@ -325,6 +328,9 @@ Result<void> run_further(const SessionRequest& request, const Plan& plan, storag
       store.add_event(run, {start->t_s, utc_now(), kFurther,
                             fmt::format("{} further {} to tell effects apart", steps.size(),
                                         steps.size() == 1 ? "pose" : "poses")});
+  for (const std::string& reason : further.reasons) {
+    if (noted) noted = store.add_event(run, {start->t_s, utc_now(), kReason, reason});
+  }
   if (!noted) return noted;
   const auto connections = connect_rig(rig);
   if (!connections) return fail(connections.error());
@@ -384,17 +390,17 @@ Result<Session> run_session(const SessionRequest& request, const EngineControl& 
   }
   *connections = {};  // nothing piles up while the poses are looked at
   if (!session.outcome) return session;
-  std::vector<PlanStep> steps;
+  FurtherSteps further;
   if (request.further) {
     auto asked_for = request.further(begun->run);
     if (!asked_for) {
       session.outcome = fail(asked_for.error());
       return session;
     }
-    steps = *std::move(asked_for);
+    further = *std::move(asked_for);
   }
-  if (!steps.empty()) {
-    session.outcome = run_further(request, plan, begun->run, steps, *store, control, observer);
+  if (!further.steps.empty()) {
+    session.outcome = run_further(request, plan, begun->run, further, *store, control, observer);
   } else if (begun->plan_is_done) {
     session.outcome = store->finish_run(begun->run, storage::RunState::finished, utc_now());
   }

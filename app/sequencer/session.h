@@ -14,6 +14,12 @@
 
 namespace plumbline::app {
 
+/// Grid steps, numbered from 0, that a run goes on with once its plan is done, and why.
+struct FurtherSteps {
+  std::vector<PlanStep> steps;
+  std::vector<std::string> reasons = {};  ///< noted with the run, an event each
+};
+
 struct SessionRequest {
   const RigDescription& rig;
   std::filesystem::path database;
@@ -24,8 +30,8 @@ struct SessionRequest {
   std::string operator_name = {};  ///< who measures; noted as an event unless empty
   std::string job = {};            ///< of a queue, and when it began; noted like the operator
   std::optional<Plan> plan = {};   ///< instead of the one that `rig` describes
-  /// Asked once the plan is done: grid steps, numbered from 0, that the same run goes on with.
-  std::function<Result<std::vector<PlanStep>>(storage::RunId)> further = {};
+  /// Asked once the plan is done.
+  std::function<Result<FurtherSteps>(storage::RunId)> further = {};
 };
 
 /// A run that has been started: how it ended, and which one it is.

@@ -59,6 +59,39 @@ std::vector<Alternative> proven_rivals(const SearchInput& input, const Candidate
   return rivals;
 }
 
+/// A field of the room in the place of what moved the head: felt by every axis, it is one rival
+/// with as many numbers as axes. The fewest of its parameters that do as much.
+std::optional<Alternative> field_of_room(const SearchInput& input, const CandidateList& list,
+                                         const SearchResult& result,
+                                         const EnlargedParameters& base) {
+  const auto field = std::find_if(list.candidates.begin(), list.candidates.end(),
+                                  [](const Candidate& c) { return c.effect->of_the_room(); });
+  if (field == list.candidates.end()) return {};
+  const std::size_t count = field->effect->parameters().size();
+  for (std::size_t only = 0; only <= count; ++only) {  // the last time all of them
+    EnlargedParameters with = base;
+    for (const Candidate& candidate : list.candidates) {
+      if (candidate.effect != field->effect) continue;
+      Candidate axis = candidate;
+      for (std::size_t k = 0; k < count; ++k)
+        if (only < count && k != only) axis.hypothesis.p[k] = 0;
+      const auto& p = axis.hypothesis.p;
+      if (std::any_of(p.begin(), p.end(), [](double value) { return value != 0; }))
+        with = with_effect(with, axis.active());
+    }
+    if (with.effects.size() == base.effects.size()) continue;
+    EnlargedFit fit = fit_enlarged(input.log, result.observed, result.whitening, with);
+    if (fit.determined && fit.chi2 <= result.fit.chi2 + kIndistinguishable)
+      return Alternative{field->effect->id(), std::move(fit)};
+  }
+  return {};
+}
+
+/// Named candidates, alone or, where none does alone, in sums.
+std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateList& list,
+                                      const SearchResult& result, std::size_t index,
+                                      const EnlargedParameters& base);
+
 }  // namespace
 
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
@@ -67,6 +100,22 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   const EnlargedParameters base = without_effect(result.fit.parameters, index);
   if (found.effect->certain(input.log, found.axis))
     return proven_rivals(input, list, result, base, found);
+  std::vector<Alternative> rivals = named_rivals(input, list, result, index, base);
+  const bool is_there =
+      std::any_of(result.evidence.begin(), result.evidence.end(),
+                  [](const Evidence& e) { return e.candidate.effect->of_the_room(); });
+  if (found.effect->subject() == Subject::head && !is_there) {
+    if (auto field = field_of_room(input, list, result, base)) rivals.push_back(*std::move(field));
+  }
+  return rivals;
+}
+
+namespace {
+
+std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateList& list,
+                                      const SearchResult& result, std::size_t index,
+                                      const EnlargedParameters& base) {
+  const Candidate& found = result.evidence[index].candidate;
   const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
   const double found_gain = without.chi2 - result.fit.chi2;
   const auto found_free =
@@ -149,5 +198,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   }
   return {};
 }
+
+}  // namespace
 
 }  // namespace plumbline

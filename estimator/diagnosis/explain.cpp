@@ -7,6 +7,7 @@
 #include "estimator/diagnosis/code_estimate.h"
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/findings.h"
+#include "estimator/diagnosis/fitted_terms.h"
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/separation.h"
 #include "estimator/diagnosis/validated_search.h"
@@ -275,6 +276,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
       worst.u_mps2 = result.after.heldout_pose_rms_mps2[i];
     }
   }
+  result.fitted_terms = fitted_terms(log, found.fit.parameters, result.floor_pose_rms_mps2);
   // What is left against the noise that was re-estimated beside the effects: all in all, and of
   // each axis, since what is slow is many times the noise before it is much of χ².
   const double dof = 3 * static_cast<double>(input.poses.size()) -

@@ -43,6 +43,19 @@ std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
   return found;
 }
 
+/// Whether the log has all that the effect is a function of; notes what it lacks.
+bool has_columns_of(const Effect& effect, const VisitLog& log, RestoredModel& restored) {
+  bool all = true;
+  for (const std::string& column : effect.columns()) {
+    if (log.has_column(column)) continue;
+    all = false;
+    if (std::find(restored.lacking.begin(), restored.lacking.end(), column) ==
+        restored.lacking.end())
+      restored.lacking.push_back(column);
+  }
+  return all;
+}
+
 void restore(const Effect& effect, const std::vector<std::size_t>& axes,
              const std::vector<EffectParameter>& reported, EnlargedParameters& model) {
   if (!effect.carries_over()) return;
@@ -64,7 +77,8 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
   for (const FoundEffect& found : model.effects) {
     const std::size_t before = parameters.effects.size();
     for (const Effect* effect : named)
-      if (effect->id() == found.id) restore(*effect, found.axes, found.parameters, parameters);
+      if (effect->id() == found.id && has_columns_of(*effect, log, restored))
+        restore(*effect, found.axes, found.parameters, parameters);
     for (const auto& effect : restored.owned) {
       // Bias and scale form of a column share the id; the unit of c tells them apart.
       if (effect->id() == found.id && !found.parameters.empty() &&

@@ -16,6 +16,7 @@ struct RestoredModel {
   std::vector<std::shared_ptr<const Effect>> owned;  ///< effects that exist for that set only
   /// Names of what belonged to one run, needs a column that the set lacks, or is not known here.
   std::vector<std::string> left_out;
+  std::vector<std::string> lacking;  ///< columns that effects among them need
 };
 RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log);
 

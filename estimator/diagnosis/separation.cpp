@@ -373,16 +373,13 @@ std::string by_mounting(const ActiveEffect& found, const Alternative& rival, std
   std::vector<const Effect*> others;
   for (std::size_t e = 0; e < rival.fit.parameters.effects.size(); ++e)
     if (e >= kept) others.push_back(rival.fit.parameters.effects[e].effect);
-  const auto of = [](const Effect& effect, const char* prefix) {
-    return effect.id().starts_with(prefix);
-  };
   bool other_field = false, other_head = false, other_sensor = false;
   for (const Effect* other : others) {
-    other_field |= of(*other, "env.");
+    other_field |= other->of_the_room();
     other_head |= other->subject() == Subject::head;
-    other_sensor |= other->subject() == Subject::sensor && !of(*other, "env.");
+    other_sensor |= other->subject() == Subject::sensor && !other->of_the_room();
   }
-  const bool field = of(*found.effect, "env."), head = found.effect->subject() == Subject::head;
+  const bool field = found.effect->of_the_room(), head = found.effect->subject() == Subject::head;
   if ((head && other_field) || (field && other_head))
     return "turn the base by 180° in azimuth and measure again: a field of the room stays, the "
            "head turns along";
@@ -395,10 +392,19 @@ std::string by_mounting(const ActiveEffect& found, const Alternative& rival, std
          "again";
 }
 
+/// Whether a field of the room stands against a displaced head: what is left between them hangs on
+/// how the field enters by the cross sensitivities, of which the model knows nothing.
+bool is_same_to_gravity(const ActiveEffect& found, const Alternative& rival, std::size_t kept) {
+  const auto& effects = rival.fit.parameters.effects;
+  return found.effect->subject() == Subject::head && effects.size() > kept &&
+         std::all_of(effects.begin() + static_cast<std::ptrdiff_t>(kept), effects.end(),
+                     [](const ActiveEffect& other) { return other.effect->of_the_room(); });
+}
+
 }  // namespace
 
 HeadReach reach_of(const VisitLog& log) {
-  HeadReach reach{1e9, -1e9, 1e9, -1e9};
+  HeadReach reach{1e9, -1e9, 1e9, -1e9, false};
   for (const Visit& visit : log.visits) {
     reach.delta_min_deg = std::min(reach.delta_min_deg, visit.delta_rad / effect::kRadPerDeg);
     reach.delta_max_deg = std::max(reach.delta_max_deg, visit.delta_rad / effect::kRadPerDeg);
@@ -409,13 +415,25 @@ HeadReach reach_of(const VisitLog& log) {
 }
 
 Separation separate(const SearchInput& input, const SearchResult& result, std::size_t index,
-                    const std::vector<Alternative>& rivals, const HeadReach& reach) {
+                    const std::vector<Alternative>& all, const HeadReach& reach) {
   Separation separation;
+  const ActiveEffect& found = result.fit.parameters.effects[index];
+  const std::size_t kept = result.fit.parameters.effects.size() - 1;
+  std::vector<Alternative> rivals;
+  for (const Alternative& rival : all) {
+    if (!is_same_to_gravity(found, rival, kept)) {
+      rivals.push_back(rival);
+      continue;
+    }
+    separation.words += (separation.words.empty() ? "" : "; ") +
+                        std::string("no poses of this head tell it from ") + rival.name + ": " +
+                        by_mounting(found, rival, kept);
+  }
   if (rivals.empty()) return separation;
   const Design design(input, result, rivals);
   Proposal proposal = best_proposal(design, within(reach));
   std::string condition;
-  if (proposal.decided() < rivals.size() && reach.h_min_deg > -60) {
+  if (proposal.decided() < rivals.size() && reach.h_min_deg > -60 && !reach.is_limit) {
     HeadReach below = reach;
     below.h_min_deg = -80;
     Proposal wider = best_proposal(design, within(below));
@@ -437,11 +455,13 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
         std::minmax_element(proposal.stops.begin(), proposal.stops.end(),
                             [](const Stop& a, const Stop& b) { return a.h_deg < b.h_deg; });
     const bool one = proposal.stops.size() == 1;
+    const std::string others = separation.words;
     separation.words = format(one ? "%.0f further pose " : "%.0f further poses ",
                               static_cast<double>(proposal.stops.size())) +
                        proposal.how + format(" (h from %.0f° to %.0f°)", low->h_deg, high->h_deg) +
                        condition + (one ? " tells it from " : " tell it from ") + joined(decided) +
-                       format(" by %.1f standard deviations", std::sqrt(least));
+                       format(" by %.1f standard deviations", std::sqrt(least)) +
+                       (others.empty() ? "" : "; " + others);
     separation.plan = {proposal.stops, proposal.samples_factor, std::sqrt(least)};
   }
   for (std::size_t r = 0; r < rivals.size(); ++r) {
@@ -450,8 +470,7 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
         (separation.words.empty() ? "" : "; ") +
         std::string("no poses of this head tell it from ") + rivals[r].name +
         format(" (%.1f standard deviations at most): ", std::sqrt(proposal.most[r])) +
-        by_mounting(result.fit.parameters.effects[index], rivals[r],
-                    result.fit.parameters.effects.size() - 1);
+        by_mounting(found, rivals[r], kept);
   }
   return separation;
 }

@@ -63,6 +63,10 @@ bool is_unexplained(const VerdictInput& input, std::size_t axis) {
 
 void decide_verdict(const VerdictInput& input, Diagnosis& diagnosis) {
   diagnosis.p_value = 1;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (obstacle(input, axis).empty())
+      diagnosis.p_value =
+          std::min(diagnosis.p_value, static_cast<double>(kAxisCount) * input.axis[axis].p_value);
   if (input.poses < kFewestPosesToDecide) {
     diagnosis.verdict = Verdict::undetermined;
     diagnosis.reason = std::to_string(input.poses) + " poses are too few to tell an effect from " +
@@ -79,8 +83,6 @@ void decide_verdict(const VerdictInput& input, Diagnosis& diagnosis) {
       append(obstacles, axis, words);
       continue;
     }
-    diagnosis.p_value =
-        std::min(diagnosis.p_value, static_cast<double>(kAxisCount) * input.axis[axis].p_value);
     append(is_unexplained(input, axis) ? excess : ordinary, axis, comparison(input.axis[axis]));
   }
   if (!excess.empty()) {

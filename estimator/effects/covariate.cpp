@@ -28,6 +28,7 @@ class CovariateEffect final : public Effect {
     if (!(largest > 0)) return {};
     return {{{effect::kSmallTerm / largest, mean}}};
   }
+  std::vector<std::string> columns() const override { return {column_}; }
   double term_g(const TermInput& input, const double* p) const override {
     const double value = p[0] * (input.at().covariate[index_] - p[1]);
     return scale_ ? value * input.a() : value;

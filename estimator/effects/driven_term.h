@@ -57,7 +57,7 @@ class DrivenTerm : public SmoothTerm {
   ParameterInfo place(const char* name) const {
     const auto [low, high] = range();
     constexpr double kFine = 1e-3;
-    return {name, variable().angle ? "rad" : "", ParameterRole::shape, kFine * (high - low), true};
+    return {name, variable().unit(), ParameterRole::shape, kFine * (high - low), true};
   }
   /// What an axis does again and again over its range it does by its own component.
   bool is_of_another_axis(std::size_t axis) const {

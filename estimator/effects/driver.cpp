@@ -124,6 +124,22 @@ bool Driver::varies() const {
   });
 }
 
+std::string Driver::unit() const {
+  if (is_clock()) return "s";
+  if (angle || name == "h_deg") return "rad";
+  if (recorded) {
+    const std::string column = name.substr(0, name.find(".rate"));
+    const std::size_t at = column.rfind('_');
+    std::string of_column = at == std::string::npos ? "" : column.substr(at + 1);
+    if (column == kTemperatureColumn) of_column = "K";
+    return of_column.empty() || !is_rate() ? of_column : of_column + "/h";
+  }
+  if (two_valued) return "";
+  if (past.find("turn of delta") != std::string::npos || past.find("of h") != std::string::npos)
+    return "rad";
+  return component || name == "previous_pose" ? "g" : "";
+}
+
 std::size_t Driver::fewest_values() const {
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (const std::vector<double>& of_axis : value)

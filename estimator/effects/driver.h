@@ -29,6 +29,9 @@ struct Driver {
   double scatter = 0;  ///< of single readings about the value that stands for a dwell
   /// The visit to which the head came from where nothing recorded says; 0 where that is the first.
   std::size_t begins_anew = 0;
+  /// Of `value`: "rad", "s", "g", that in which a column's name ends ("V" of supply_V, K above the
+  /// reference of temp_C, per hour of a rate); empty where it has none.
+  std::string unit() const;
   bool varies() const;
   /// How many different values it took on any axis at least.
   std::size_t fewest_values() const;

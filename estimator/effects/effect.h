@@ -110,6 +110,8 @@ class Effect {
                                                 const std::vector<double>& /*p*/) const {
     return {};
   }
+  /// Sensor: whether one source outside the triad is felt by every axis.
+  virtual bool of_the_room() const { return false; }
   /// Whether it depends on earlier visits, or on what was recorded then.
   virtual bool remembers() const { return false; }
   /// Whether its response at a visit before which nothing is recorded is a guess that no parameter
@@ -152,6 +154,8 @@ class Effect {
   virtual void normalise(std::vector<double>&) const {}
   /// Whether it is the fault of one visit alone, which no other visit can predict.
   virtual bool concerns_one_visit() const { return false; }
+  /// Recorded columns that it is a function of, kTemperatureColumn among them.
+  virtual std::vector<std::string> columns() const { return {}; }
   /// What a user wrote to describe it; empty for built-in effects.
   virtual std::string definition() const { return {}; }
   /// What belonged to one run only does not carry over to another set of the same unit.

@@ -11,6 +11,7 @@ class BaseField final : public Effect {
  public:
   std::string id() const override { return "env.base_field"; }
   Subject subject() const override { return Subject::sensor; }
+  bool of_the_room() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"m1", "g", ParameterRole::amplitude}, {"m2", "g", ParameterRole::amplitude}};
   }

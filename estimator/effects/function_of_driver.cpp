@@ -20,8 +20,8 @@ class Polynomial final : public DrivenTerm {
       : DrivenTerm(std::move(driver), target), degree_(degree) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    std::vector<ParameterInfo> infos = {{"low", "", ParameterRole::index},
-                                        {"high", "", ParameterRole::index}};
+    std::vector<ParameterInfo> infos = {{"low", variable().unit(), ParameterRole::index},
+                                        {"high", variable().unit(), ParameterRole::index}};
     for (int d = first_degree(); d <= degree_; ++d)
       infos.push_back({"p" + std::to_string(d), target().unit(), ParameterRole::amplitude});
     return infos;
@@ -150,8 +150,8 @@ class Wave final : public DrivenTerm {
 
   bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"start", "", ParameterRole::index},
-            {"period", "", ParameterRole::shape},
+    return {{"start", variable().unit(), ParameterRole::index},
+            {"period", variable().unit(), ParameterRole::shape},
             {"c", target().unit(), ParameterRole::amplitude},
             {"s", target().unit(), ParameterRole::amplitude}};
   }
@@ -208,8 +208,8 @@ class Power final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"start", "", ParameterRole::index},
-            {"end", "", ParameterRole::index},
+    return {{"start", variable().unit(), ParameterRole::index},
+            {"end", variable().unit(), ParameterRole::index},
             {"power", "", ParameterRole::shape},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
@@ -235,8 +235,8 @@ class Logarithm final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"start", "", ParameterRole::index},
-            {"tau", "", ParameterRole::shape},
+    return {{"start", variable().unit(), ParameterRole::index},
+            {"tau", variable().unit(), ParameterRole::shape},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {

@@ -22,8 +22,8 @@ class LineTimesHarmonic final : public DrivenTerm {
       : DrivenTerm(std::move(driver), target), angle_(std::move(angle)) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", "", ParameterRole::index},
-            {"high", "", ParameterRole::index},
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
             {"n", "", ParameterRole::index},
             {"c0", target().unit(), ParameterRole::amplitude},
             {"s0", target().unit(), ParameterRole::amplitude},
@@ -60,10 +60,10 @@ class LineTimesLine final : public DrivenTerm {
       : DrivenTerm(std::move(driver), target), other_(std::move(other)) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", "", ParameterRole::index},
-            {"high", "", ParameterRole::index},
-            {"other_low", "", ParameterRole::index},
-            {"other_high", "", ParameterRole::index},
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
+            {"other_low", other_->unit(), ParameterRole::index},
+            {"other_high", other_->unit(), ParameterRole::index},
             {"p10", target().unit(), ParameterRole::amplitude},
             {"p01", target().unit(), ParameterRole::amplitude},
             {"p11", target().unit(), ParameterRole::amplitude}};

@@ -58,7 +58,8 @@ class PlayLag final : public Lag {
   PlayLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 1) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"width", "", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
+    return {{"width", variable().unit(), ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
@@ -114,7 +115,7 @@ class FrictionLag final : public Lag {
   FrictionLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 2) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"reach", "", ParameterRole::shape},
+    return {{"reach", variable().unit(), ParameterRole::shape},
             {"release", "", ParameterRole::index},
             {"p", target().unit(), ParameterRole::amplitude}};
   }

@@ -200,8 +200,8 @@ class SawTooth final : public DrivenTerm {
   std::vector<ParameterInfo> parameters() const override {
     const double fine = kFine * edge();
     return {{"edge", "", ParameterRole::index},
-            {"period", "", ParameterRole::shape, fine},
-            {"at", "", ParameterRole::shape, fine, true},
+            {"period", variable().unit(), ParameterRole::shape, fine},
+            {"at", variable().unit(), ParameterRole::shape, fine, true},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {

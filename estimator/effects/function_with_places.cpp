@@ -16,7 +16,7 @@ class Bell final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   std::vector<ParameterInfo> parameters() const override {
-    const char* unit = variable().angle ? "rad" : "";
+    const std::string unit = variable().unit();
     if (is_sparse())
       return {{"middle", unit, ParameterRole::index},
               {"width", unit, ParameterRole::index},
@@ -135,8 +135,8 @@ class Bend final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", "", ParameterRole::index},
-            {"high", "", ParameterRole::index},
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
             {"side", "", ParameterRole::index},
             place("at"),
             {"p", target().unit(), ParameterRole::amplitude}};
@@ -191,7 +191,9 @@ class Step final : public DrivenTerm {
   std::vector<ParameterInfo> parameters() const override {
     // Hardly a reading lies in the edge of a sharp step: its width is not differentiated.
     const auto width = edge_ == StepEdge::sharp ? ParameterRole::index : ParameterRole::shape;
-    return {place("at"), {"width", "", width}, {"p", target().unit(), ParameterRole::amplitude}};
+    return {place("at"),
+            {"width", variable().unit(), width},
+            {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();

@@ -60,6 +60,7 @@ class Memory {
         log_(log) {}
 
   const std::string& name() const { return name_; }
+  std::string unit() const { return driver_->unit(); }
   /// Of an attitude, nothing when the head has long been at rest: the 12 parameters are those of
   /// rest then.
   bool vanishes_at_rest() const { return less_average_ && !driver_->recorded; }
@@ -127,8 +128,8 @@ class MemoryTerm final : public SmoothTerm {
   Subject subject() const override { return Subject::sensor; }
   bool remembers() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", "", ParameterRole::index},
-            {"high", "", ParameterRole::index},
+    return {{"low", memory_->unit(), ParameterRole::index},
+            {"high", memory_->unit(), ParameterRole::index},
             {"t0", "s", ParameterRole::index},
             {"tau", "s", ParameterRole::shape},
             {"start", target_.unit(), ParameterRole::amplitude},

@@ -15,6 +15,7 @@ class TemperatureBias final : public Effect {
     if (!log.has_temperature) return {};
     return {{{effect::kSmallTerm}}};
   }
+  std::vector<std::string> columns() const override { return {kTemperatureColumn}; }
   double term_g(const TermInput& input, const double* p) const override {
     return p[0] * input.at().temperature_K;
   }

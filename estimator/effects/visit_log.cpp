@@ -163,6 +163,11 @@ std::array<int, 3> direction_after(const Visit& before, double delta_rad) {
   return direction;
 }
 
+bool VisitLog::has_column(const std::string& name) const {
+  if (name == kTemperatureColumn) return has_temperature;
+  return std::find(covariate_names.begin(), covariate_names.end(), name) != covariate_names.end();
+}
+
 RunHistory history_of(const VisitLog& log) {
   return {log.has_temperature, log.covariate_names, log.visits};
 }

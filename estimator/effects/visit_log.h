@@ -33,13 +33,16 @@ struct Visit {
   PerAxis<double> mean_V{};       ///< of the readings
 };
 
+inline constexpr const char* kTemperatureColumn = "temp_C";
+
 /// The visits in order and what holds for all of them.
 struct VisitLog {
   std::vector<Visit> visits;
   double gamma = 1;  ///< local over standard gravity
   bool has_temperature = false;
-  std::vector<std::string> covariate_names;  ///< in the order of Visit::covariate
-  PerAxis<double> sample_sd_V{};             ///< white noise of one sample, within the dwells
+  std::vector<std::string> covariate_names;        ///< in the order of Visit::covariate
+  bool has_column(const std::string& name) const;  ///< recorded, temperature included
+  PerAxis<double> sample_sd_V{};                   ///< white noise of one sample, within the dwells
   /// The same before the converter: freed of what rounding and stuck bits do to it.
   PerAxis<double> input_sd_V{};
   PerAxis<CodeFaults> codes;                ///< where a converter is declared

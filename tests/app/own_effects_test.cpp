@@ -46,6 +46,8 @@ TEST(OwnEffects, AreRefusedWithPlaceAndReason) {
   EXPECT_THAT(refusal("[[effect]]\nname = \"my effect\"\nacts_on = \"bias\"\n"
                       "expression = \"c*a\"\n[effect.parameters]\nc = { start = 1 }\n"),
               HasSubstr("letters"));
+  EXPECT_THAT(refusal(effect("c * 0 * a")), HasSubstr("does not depend on c"));
+  EXPECT_THAT(refusal(effect("c * a", "h")), HasSubstr("the same for all"));
   EXPECT_EQ(refusal(effect("c * a * (temp_C - 20) * prev_a_x * sin(delta_deg * _pi / 180)")),
             "accepted");
 }
@@ -60,6 +62,13 @@ TEST(OwnEffects, NeedTheirColumns) {
   EXPECT_THAT(missing.error().message, HasSubstr("did you mean rh_pc?"));
   samples.covariates.front().name = "rh_pct";
   EXPECT_TRUE(check_columns(*effects, samples).has_value());
+  const auto warm = parse_own_effects(effect("c * (temp_C - 20)"), "my.toml", 20);
+  ASSERT_TRUE(warm.has_value()) << warm.error().message;
+  const auto cold = check_columns(*warm, samples);
+  ASSERT_FALSE(cold.has_value());
+  EXPECT_THAT(cold.error().message, HasSubstr("needs temp_C"));
+  samples.temp_C = {21};
+  EXPECT_TRUE(check_columns(*warm, samples).has_value());
 }
 
 TEST(OwnEffects, SeeWhatFormatsSays) {

@@ -206,6 +206,35 @@ TEST(Program, CorrectsReadings) {
   EXPECT_EQ(correct("nothing.json").exit_code, 2);
 }
 
+// Readings at an end of the converter and beyond 1 g: what comes out may mean nothing, and says so.
+TEST(Program, CorrectsWithCautions) {
+  const TempFolder temp;
+  const fs::path folder = temp.path();
+  ExampleSet{}.write(folder);
+  ASSERT_EQ(run_plumbline(calibrate_arguments(folder, folder / "out")).exit_code, 0);
+  write_text(folder / "run.toml",
+             example_run_toml() + "[adc]\nbits = 16\nmin_V = -5.0\nmax_V = 0.0\n");
+  // The rest of the first pose, and one that no head could have shown.
+  std::istringstream samples(text_of(folder / "samples.csv"));
+  std::string header, row;
+  std::getline(samples, header);
+  ASSERT_EQ(header, "t_s,pose,delta_deg,h_deg,ux_V,uy_V,uz_V");
+  std::getline(samples, row);
+  write_text(folder / "readings.csv", header + '\n' + row + "\n100,0,0,0,-5,-2.4,-2.3\n");
+  const auto correct = [&](const std::string& columns) {
+    return run_plumbline({"correct", "--calibration", folder / "out/result.json", "--samples",
+                          folder / "readings.csv", "--config", folder / "run.toml", "--out",
+                          folder / "corrected.csv", "--columns", columns});
+  };
+  const auto outcome = correct("x=ux_V,y=uy_V,z=uz_V");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const std::string& text : {outcome.out, text_of(folder / "corrected.csv")}) {
+    EXPECT_THAT(text, HasSubstr("caution: x axis: 1 reading at an end of the converter's range"));
+    EXPECT_THAT(text, HasSubstr("caution: x axis: 1 reading beyond ±1 g"));
+  }
+  EXPECT_THAT(correct("x=ux_V,y=ux_V,z=uz_V").err, HasSubstr("ux_V cannot be two axes"));
+}
+
 TEST(Program, IdentifiesNoise) {
   const TempFolder folder;
   ExampleSet{.static_samples = 20000}.write(folder.path());

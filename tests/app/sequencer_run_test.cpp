@@ -120,15 +120,19 @@ TEST_F(SequencerRun, StopsOnRequestAndResumes) {
 }
 
 TEST_F(SequencerRun, GoesOnWithFurtherPosesInTheSameRun) {
+  constexpr const char* kReason =
+      "sensor.quadratic, or sensor.cubic: 2 further poses in random order (h from -10° to 10°) "
+      "tell it from sensor.cubic by 6.0 standard deviations";
   start_rig();
   int asked = 0;
   SessionRequest request{.rig = rig_, .database = database()};
-  request.further = [&](storage::RunId run) -> Result<std::vector<PlanStep>> {
+  request.further = [&](storage::RunId run) -> Result<FurtherSteps> {
     ++asked;
     EXPECT_EQ(run, 1);
     EXPECT_EQ(stored().grid.poses.size(), 12u);  // what was measured can be looked at
-    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20},
-                                 {1, storage::PoseKind::grid, {135, -10}, {}, 40}};
+    return FurtherSteps{{{0, storage::PoseKind::grid, {45, 10}, {}, 20},
+                         {1, storage::PoseKind::grid, {135, -10}, {}, 40}},
+                        {kReason}};
   };
   const auto session = run_session(request, control_, {});
   ASSERT_TRUE(session.has_value()) << session.error().message;
@@ -144,6 +148,7 @@ TEST_F(SequencerRun, GoesOnWithFurtherPosesInTheSameRun) {
   for (std::size_t i = 1; i < run.grid.samples.size(); ++i)
     ASSERT_GT(run.grid.samples.t_s[i], run.grid.samples.t_s[i - 1]);
   EXPECT_THAT(events("separate"), testing::ElementsAre(HasSubstr("2 further poses")));
+  EXPECT_THAT(events("found so far"), testing::ElementsAre(kReason));
   expect_motors_at_rest();
 }
 
@@ -151,11 +156,11 @@ TEST_F(SequencerRun, ResumesAmongFurtherPoses) {
   start_rig();
   std::vector<std::size_t> seen;
   SessionRequest request{.rig = rig_, .database = database()};
-  request.further = [&](storage::RunId) -> Result<std::vector<PlanStep>> {
+  request.further = [&](storage::RunId) -> Result<FurtherSteps> {
     seen.push_back(stored().grid.poses.size());
-    if (seen.back() >= 15) return std::vector<PlanStep>{};
-    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20},
-                                 {1, storage::PoseKind::grid, {135, -10}, {}, 20}};
+    if (seen.back() >= 15) return FurtherSteps{};
+    return FurtherSteps{{{0, storage::PoseKind::grid, {45, 10}, {}, 20},
+                         {1, storage::PoseKind::grid, {135, -10}, {}, 20}}};
   };
   int further_moves = 0;
   const auto stopped = run_session(request, control_, [&](const Progress& progress) {
@@ -191,8 +196,8 @@ TEST_F(SequencerRun, ResumesAmongFurtherPoses) {
 TEST_F(SequencerRun, ResumedWithoutFurtherPosesARunAmongThemEnds) {
   start_rig();
   SessionRequest request{.rig = rig_, .database = database()};
-  request.further = [](storage::RunId) -> Result<std::vector<PlanStep>> {
-    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20}};
+  request.further = [](storage::RunId) -> Result<FurtherSteps> {
+    return FurtherSteps{{{0, storage::PoseKind::grid, {45, 10}, {}, 20}}};
   };
   const auto stopped = run_session(request, control_, [&](const Progress& progress) {
     if (progress.steps > kSteps) control_.request_stop();
@@ -210,8 +215,8 @@ TEST_F(SequencerRun, ResumesAFinishedPlanForFurtherPoses) {
   start_rig();
   ASSERT_TRUE(run().has_value());
   SessionRequest request{.rig = rig_, .database = database(), .resume = true};
-  request.further = [](storage::RunId) -> Result<std::vector<PlanStep>> {
-    return std::vector<PlanStep>{{0, storage::PoseKind::grid, {45, 10}, {}, 20}};
+  request.further = [](storage::RunId) -> Result<FurtherSteps> {
+    return FurtherSteps{{{0, storage::PoseKind::grid, {45, 10}, {}, 20}}};
   };
   const auto resumed = run_session(request, control_, {});
   ASSERT_TRUE(resumed.has_value()) << resumed.error().message;

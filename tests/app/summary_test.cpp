@@ -59,6 +59,25 @@ TEST(Summary, SaysWhatTheFreshPosesAndTheLimitSay) {
       "CONDITIONAL FAIL: largest error 0.21 m/s², limit 0.200 m/s².");
 }
 
+TEST(Summary, FreshPosesThatContradictDoNotConfirm) {
+  Calibration calibration = some_calibration();
+  calibration.diagnosis.verdict = Verdict::clean;
+  Evaluation verification;
+  verification.poses = 24;
+  verification.after.pose_rms_mps2 = {0.03, 0.03, 0.05};
+  verification.after.pose_max_abs_mps2 = {0.06, 0.08, 0.12};
+  EXPECT_THAT(conclusion({}, calibration, verification),
+              HasSubstr("but 24 fresh poses do not confirm it: z axis 0.050 m/s² rms where the "
+                        "noise alone would leave 0.026, largest error 0.12 m/s²"));
+  // By chance 24 of them may be half as much again.
+  verification.after.pose_rms_mps2[2] = 1.4 * 0.026;
+  EXPECT_EQ(contradicted_axis(calibration, verification), std::nullopt);
+  // What the noise alone would leave is not known better than that.
+  verification.after.pose_rms_mps2[2] = 0.05;
+  calibration.u_floor_pose_rms_mps2[2] = 0.01;
+  EXPECT_EQ(contradicted_axis(calibration, verification), std::nullopt);
+}
+
 TEST(Summary, EndsWithTheConclusion) {
   Calibration calibration = some_calibration();
   calibration.skipped_rows = 1;

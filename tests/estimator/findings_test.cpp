@@ -306,6 +306,40 @@ TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
   }
 }
 
+TEST(Findings, NothingIsAskedBeyondTheLimitsOfAHead) {
+  const SyntheticRun data = square_on_z();
+  const Calibration limited = calibrated(data, {.reach = HeadReach{0, 350, 0, 80, true}});
+  ASSERT_EQ(limited.diagnosis.effects.size(), 1u) << limited.diagnosis.reason;
+  const FoundEffect& found = limited.diagnosis.effects.front();
+  EXPECT_FALSE(found.alternatives.empty());
+  EXPECT_THAT(found.separate_by, HasSubstr("mount the triad"));
+  EXPECT_THAT(found.separating_plan.stops, IsEmpty());
+}
+
+// A field along the tilt axis is the same on all axes as a roll of the base.
+TEST(Findings, ARollOfTheBaseMayBeAFieldOfTheRoom) {
+  const Calibration result =
+      calibrated(synthetic_run(6, kSixteenBits, {.base_roll_rad = [](double) { return 0.01; }}));
+  ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
+  const FoundEffect& found = result.diagnosis.effects.front();
+  EXPECT_EQ(found.id, "rig.base_roll");
+  EXPECT_THAT(found.alternatives, Contains("env.base_field"));
+  EXPECT_THAT(found.separate_by, HasSubstr("env.base_field: turn the base by 180°"));
+}
+
+TEST(Findings, AFittedTermStandsOverWhatItIsAFunctionOf) {
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, {.k2_x_V_per_g2 = 0.02 * 0.032});
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.fitted_terms.size(), 1u) << result.diagnosis.reason;
+  const FittedTerm& term = result.fitted_terms.front();
+  EXPECT_EQ(term.name, "sensor.quadratic");
+  EXPECT_EQ(term.axis, 0u);
+  EXPECT_EQ(term.driver, "a_x");
+  ASSERT_EQ(term.at.size(), data.run.poses.size());
+  for (std::size_t k = 0; k < term.at.size(); ++k)
+    EXPECT_NEAR(term.term_mps2[k], 0.02 * term.at[k] * term.at[k] * kStandardGravity_mps2, 0.02);
+}
+
 TEST(Findings, PosesTellRivalsApartBesideStructureWithoutAName) {
   const Calibration alone = calibrated(square_on_z());
   const Calibration beside = calibrated(square_on_z(something_happened_to_x()));

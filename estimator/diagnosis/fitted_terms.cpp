@@ -1,0 +1,82 @@
+#include "estimator/diagnosis/fitted_terms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+
+#include "estimator/effects/driver.h"
+#include "estimator/effects/smooth_term.h"
+
+namespace plumbline {
+
+namespace {
+
+/// Mean square of successive differences in the order of `at`, over twice the variance: about 1
+/// where nothing depends on it, near 0 for a smooth function. Equal places count as one place with
+/// all that is seen there.
+double roughness(const std::vector<double>& at, const Eigen::VectorXd& term) {
+  std::vector<std::size_t> order(at.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return at[a] < at[b]; });
+  if (!(at[order.back()] > at[order.front()])) return std::numeric_limits<double>::infinity();
+  const auto value = [&](std::size_t k) { return term(static_cast<Eigen::Index>(order[k])); };
+  double steps = 0;
+  for (std::size_t k = 1; k < order.size(); ++k)
+    steps += (value(k) - value(k - 1)) * (value(k) - value(k - 1));
+  return steps / (2 * (term.array() - term.mean()).square().sum());
+}
+
+}  // namespace
+
+std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParameters& model,
+                                     const PerAxis<double>& expected_mps2) {
+  constexpr double kDegPerRad = 1 / effect::kRadPerDeg;
+  const auto whole_V = predict_means_V(log, model);
+  const std::vector<Driver> drivers = instantaneous_drivers(log);
+  std::vector<FittedTerm> terms;
+  std::vector<double> size;
+  for (std::size_t e = 0; e < model.effects.size(); ++e) {
+    const auto without_V = predict_means_V(log, without_effect(model, e));
+    FittedTerm term;
+    Eigen::VectorXd course_mps2;
+    double largest = 0;
+    for (std::size_t i = 0; i < kAxisCount; ++i) {
+      const Eigen::VectorXd of_axis = model.mps2_per_V(i) * (whole_V[i] - without_V[i]);
+      const double share = of_axis.norm() / std::max(1e-300, expected_mps2[i]);
+      if (!(share > largest)) continue;
+      largest = share;
+      term.axis = i;
+      course_mps2 = of_axis;
+    }
+    if (!(largest > 0)) continue;
+    const Driver* best = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Driver& driver : drivers) {
+      const double rough = roughness(driver.value[term.axis], course_mps2);
+      if (!(rough < least)) continue;
+      least = rough;
+      best = &driver;
+    }
+    if (best == nullptr) continue;
+    const Effect& effect = *model.effects[e].effect;
+    const auto* smooth = dynamic_cast<const SmoothTerm*>(&effect);
+    term.name = smooth == nullptr ? effect.id() : smooth->driver() + ": " + smooth->shape();
+    term.driver = best->past.empty() ? best->name : best->past;
+    term.at = best->value[term.axis];
+    const bool in_rad = best->angle || best->name == "h_deg" || best->past.ends_with("h since") ||
+                        best->past.ends_with("delta since");
+    if (in_rad)
+      for (double& at : term.at) at *= kDegPerRad;
+    term.term_mps2.assign(course_mps2.begin(), course_mps2.end());
+    const auto place =
+        std::upper_bound(size.begin(), size.end(), largest, std::greater<>()) - size.begin();
+    size.insert(size.begin() + place, largest);
+    terms.insert(terms.begin() + place, std::move(term));
+  }
+  return terms;
+}
+
+}  // namespace plumbline
