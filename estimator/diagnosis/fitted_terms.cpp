@@ -29,6 +29,21 @@ double roughness(const std::vector<double>& at, const Eigen::VectorXd& term) {
   return steps / (2 * (term.array() - term.mean()).square().sum());
 }
 
+/// What a smooth term names, then the component of the own axis, then all others, the time last.
+std::vector<const Driver*> likeliest_first(const std::vector<Driver>& drivers, std::size_t axis,
+                                           const SmoothTerm* smooth) {
+  const auto rank = [&](const Driver& driver) {
+    if (smooth != nullptr && driver.name == smooth->driver()) return 0;
+    if (driver.component == axis) return 1;
+    return driver.is_clock() ? 3 : 2;
+  };
+  std::vector<const Driver*> order;
+  for (const Driver& driver : drivers) order.push_back(&driver);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](const Driver* a, const Driver* b) { return rank(*a) < rank(*b); });
+  return order;
+}
+
 }  // namespace
 
 std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParameters& model,
@@ -52,23 +67,23 @@ std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParamete
       course_mps2 = of_axis;
     }
     if (!(largest > 0)) continue;
-    const Driver* best = nullptr;
-    double least = std::numeric_limits<double>::infinity();
-    for (const Driver& driver : drivers) {
-      const double rough = roughness(driver.value[term.axis], course_mps2);
-      if (!(rough < least)) continue;
-      least = rough;
-      best = &driver;
-    }
-    if (best == nullptr) continue;
     const Effect& effect = *model.effects[e].effect;
     const auto* smooth = dynamic_cast<const SmoothTerm*>(&effect);
+    const Driver* best = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    // In an order of poses like this one several may show it alike: the likelier cause first.
+    constexpr double kClearly = 0.7;
+    for (const Driver* driver : likeliest_first(drivers, term.axis, smooth)) {
+      const double rough = roughness(driver->value[term.axis], course_mps2);
+      if (!(rough < kClearly * least)) continue;
+      least = rough;
+      best = driver;
+    }
+    if (best == nullptr) continue;
     term.name = smooth == nullptr ? effect.id() : smooth->driver() + ": " + smooth->shape();
     term.driver = best->past.empty() ? best->name : best->past;
     term.at = best->value[term.axis];
-    const bool in_rad = best->angle || best->name == "h_deg" || best->past.ends_with("h since") ||
-                        best->past.ends_with("delta since");
-    if (in_rad)
+    if (best->unit() == "rad")
       for (double& at : term.at) at *= kDegPerRad;
     term.term_mps2.assign(course_mps2.begin(), course_mps2.end());
     const auto place =

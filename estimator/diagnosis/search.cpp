@@ -38,6 +38,7 @@ class Search {
     for (int k = 0; k < kMostExchanges && (exchange_for_one_kind(model_) || exchange_one(model_));
          ++k)
       model_.drop_superfluous();
+    model_.drop_what_excess_explains();
     SearchResult result = model_.take_result();
     result.p_best_rest = p_best_rest_;
     return result;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "estimator/diagnosis/residual_test.h"
@@ -320,11 +321,49 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects,
   return true;
 }
 
-double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without) const {
+double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without,
+                                 double excess) const {
   const auto free =
       static_cast<double>(stage_.fit.parameters.free_count() - without.parameters.free_count());
   return p_of(candidate(effect),
-              log_chi_squared_tail(without.chi2 - stage_.fit.chi2, std::max(1.0, free)));
+              log_chi_squared_tail((without.chi2 - stage_.fit.chi2) / excess, std::max(1.0, free)));
+}
+
+double SearchModel::excess(std::size_t effect) const {
+  constexpr double kByChance = 1e-6, kMatters = 1.2;
+  const ActiveEffect& active = stage_.fit.parameters.effects[effect];
+  const Eigen::Index n = std::ssize(input_.log.visits);
+  double square = 0, dof = 0;
+  for (const std::size_t axis : axes_of(active)) {
+    if (stage_.coarse[axis]) return 1;  // of which the residual is no measure
+    square +=
+        stage_.fit.whitened_residual.segment(static_cast<Eigen::Index>(axis) * n, n).squaredNorm();
+    dof += static_cast<double>(n) - 4;
+  }
+  if (dof <= 0 || square < kMatters * dof || chi_squared_tail(square, dof) > kByChance) return 1;
+  return square / dof;
+}
+
+void SearchModel::drop_what_excess_explains() {
+  for (;;) {
+    std::optional<std::size_t> weakest;
+    EnlargedFit without_weakest;
+    double most = 1;  // of p over what is allowed
+    for (std::size_t k = 0; k < chosen_.size(); ++k) {
+      const double beyond = excess(k);
+      if (beyond == 1 || is_certain(candidate(k))) continue;
+      EnlargedFit without = fit_without({k});
+      if (!without.determined) continue;
+      const double ratio = p_of_removal(k, without, beyond) / false_alarm(candidate(k));
+      if (ratio <= most) continue;
+      most = ratio;
+      weakest = k;
+      without_weakest = std::move(without);
+    }
+    if (!weakest || !adopt(without_weakest.parameters)) return;
+    dropped_.push_back(candidate(*weakest).family);
+    forget(*weakest);
+  }
 }
 
 void SearchModel::drop_superfluous() {

@@ -85,6 +85,9 @@ class SearchModel {
   bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
   /// What a newcomer has made superfluous goes.
   void drop_superfluous();
+  /// Where far more is left than the noise explains, what is found has to stand out of that: an
+  /// effect that would not goes.
+  void drop_what_excess_explains();
   /// Noise that was estimated beside more than the model is estimated beside it alone; false if
   /// that cannot be.
   bool take_own_noise() { return adopt(stage_.fit.parameters); }
@@ -100,7 +103,10 @@ class SearchModel {
   void forget(std::size_t effect);
   /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;
-  double p_of_removal(std::size_t effect, const EnlargedFit& without) const;
+  double p_of_removal(std::size_t effect, const EnlargedFit& without, double excess = 1) const;
+  /// What is left of the axes that an effect acts on, in χ² for each degree of freedom; 1 where it
+  /// may be chance, or little.
+  double excess(std::size_t effect) const;
 
   const SearchInput& input_;
   const CandidateList& list_;

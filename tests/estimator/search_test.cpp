@@ -74,5 +74,25 @@ TEST(Search, AFunctionOfTheTiltDoesNotTakeThePlaceOfASensitivity) {
   EXPECT_LT(result.after.heldout_pose_rms_mps2[1], 0.5 * result.before.heldout_pose_rms_mps2[1]);
 }
 
+// A head that comes to rest anew at every pose: no function of anything, but ten times the noise
+// that the record speaks of, so that among thousands of functions some look good.
+TEST(Search, WhatEveryPoseHasForItselfHasNoDriver) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    SyntheticOptions options = full_grid();
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      options.more_V[axis] = [seed, axis](const std::array<double, 3>&, double t_s) {
+        if (t_s < 61) return 0.0;
+        std::seed_seq pose{static_cast<std::uint64_t>((t_s - 61) / 3 + 1e-6), seed, axis};
+        std::mt19937_64 random(pose);
+        return std::normal_distribution<double>(0, 8e-4)(random);
+      };
+    const Calibration result = calibrated(synthetic_run(seed, kSixteenBits, options));
+    EXPECT_TRUE(result.diagnosis.effects.empty()) << result.diagnosis.reason;
+    for (const UnlistedStructure& found : result.diagnosis.unlisted)
+      EXPECT_TRUE(found.is_of_noise()) << found.driver << ": " << found.shape;
+    EXPECT_NE(result.diagnosis.verdict, Verdict::clean);
+  }
+}
+
 }  // namespace
 }  // namespace plumbline
