@@ -269,11 +269,13 @@ std::optional<Figure> fitted_terms_figure(const FigureContext& context) {
       "largest.");
   figure.description = context.tr("Residuals against the driver of each added effect");
   figure.width = kFigureWidth;
-  figure.height = kTop + static_cast<double>((count + kColumns - 1) / kColumns) * kStepY - 14;
+  const std::size_t rows = (count + kColumns - 1) / kColumns;
+  figure.height = kTop + static_cast<double>(rows) * kStepY - 14;
   figure.draw = [context, count](Canvas& canvas) {
     const Calibration& calibration = *context.calibration;
     for (std::size_t k = 0; k < count; ++k) {
       const FittedTerm& term = calibration.fitted_terms[k];
+      const std::size_t row = k / kColumns;
       std::vector<double> residual;
       double largest = 0;
       for (std::size_t p = 0; p < term.term_mps2.size(); ++p) {
@@ -290,7 +292,7 @@ std::optional<Figure> fitted_terms_figure(const FigureContext& context) {
       y.ticks = 4;
       Plot plot(canvas,
                 {60 + static_cast<double>(k % kColumns) * kStepX,
-                 kTop + static_cast<double>(k / kColumns) * kStepY},
+                 kTop + static_cast<double>(row) * kStepY},
                 kPanelWidth, kPanelHeight, x, y);
       plot.draw_frame(context.tr("{} axis", kAxisName[term.axis]) + ": " +
                       shortened(term.name, kLongestTitle));

@@ -38,6 +38,7 @@ std::vector<const Driver*> likeliest_first(const std::vector<Driver>& drivers, s
     return driver.is_clock() ? 3 : 2;
   };
   std::vector<const Driver*> order;
+  order.reserve(drivers.size());
   for (const Driver& driver : drivers) order.push_back(&driver);
   std::stable_sort(order.begin(), order.end(),
                    [&](const Driver* a, const Driver* b) { return rank(*a) < rank(*b); });
