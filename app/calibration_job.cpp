@@ -66,15 +66,13 @@ bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limit
 
 /// Fresh poses took no part in the fit either: the decision is by the largest error of all.
 Decision with_fresh_poses(const Calibration& calibration, const Evaluation& verification) {
-  Decision decision = calibration.decision;
-  if (decision.status == DecisionStatus::none) return decision;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double error_mps2 = verification.after.pose_max_abs_mps2[i];
-    if (error_mps2 > decision.max_abs_error_mps2)
-      decision =
-          decide(decision.limit_mps2, error_mps2, calibration.after.heldout_pose_rms_mps2[i]);
-  }
-  return decision;
+  const Decision& decision = calibration.decision;
+  const PerAxis<double>& error_mps2 = verification.after.pose_max_abs_mps2;
+  const auto worst = std::max_element(error_mps2.begin(), error_mps2.end());
+  if (decision.status == DecisionStatus::none || *worst <= decision.max_abs_error_mps2)
+    return decision;
+  const auto axis = static_cast<std::size_t>(worst - error_mps2.begin());
+  return decide(decision.limit_mps2, *worst, calibration.after.heldout_pose_rms_mps2[axis]);
 }
 
 Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& outcome,
@@ -111,9 +109,8 @@ Result<void> write_results(const CalibrationJob& job, const CalibrationOutcome& 
 
 Result<void> add_own_effects(const std::filesystem::path& path, CalibrationJob& job) {
   if (path.empty()) return {};
-  auto effects = read_own_effects(path, job.description.reference_C);
+  auto effects = own_effects_for(path, job.description.reference_C, job.run.samples);
   if (!effects) return fail(effects.error());
-  if (auto good = check_columns(*effects, job.run.samples); !good) return good;
   auto hash = sha256_of_file(path);
   if (!hash) return fail(hash.error());
   job.provenance.input_sha256.emplace_back(path.string(), *std::move(hash));

@@ -19,10 +19,6 @@ std::string unit_name(const RunDescription& description) {
   return description.dut.serial.empty() ? "The unit" : "Unit " + description.dut.serial;
 }
 
-std::string counted(std::size_t count, const char* singular) {
-  return fmt::format("{} {}{}", count, singular, count == 1 ? "" : "s");
-}
-
 /// Pads by what is seen: "±" and "²" are two bytes and one column.
 std::string right_aligned(const std::string& text, std::size_t width) {
   const auto columns = static_cast<std::size_t>(
@@ -77,21 +73,9 @@ std::string error_rows(const Calibration& calibration,
   return rows;
 }
 
-/// The axis whose residual stands out most against the floor.
-std::size_t worst_axis(const Calibration& calibration) {
-  const auto ratio = [&](std::size_t axis) {
-    return calibration.after.heldout_pose_rms_mps2[axis] /
-           std::max(1e-300, calibration.floor_pose_rms_mps2[axis]);
-  };
-  std::size_t worst = 0;
-  for (std::size_t axis = 1; axis < kAxisCount; ++axis) {
-    if (ratio(axis) > ratio(worst)) worst = axis;
-  }
-  return worst;
-}
-
 std::string verdict_words(const Calibration& calibration) {
-  const std::size_t axis = worst_axis(calibration);
+  const std::size_t axis =
+      axis_standing_out(calibration.after.heldout_pose_rms_mps2, calibration.floor_pose_rms_mps2);
   const std::string residual =
       fmt::format("{} axis: {} m/s² rms where the noise alone would leave {}", kAxisName[axis],
                   significant(calibration.after.heldout_pose_rms_mps2[axis], 2),
@@ -115,23 +99,28 @@ std::string verdict_words(const Calibration& calibration) {
 
 }  // namespace
 
+std::string counted(std::size_t count, const char* singular) {
+  return fmt::format("{} {}{}", count, singular, count == 1 ? "" : "s");
+}
+
 std::string conclusion(const RunDescription& description, const Calibration& calibration,
                        const std::optional<Evaluation>& verification) {
   std::string text = unit_name(description) + " " + verdict_words(calibration);
   if (verification) {
     const auto& errors = verification->after.pose_max_abs_mps2;
     const std::string poses = counted(verification->poses, "fresh pose");
-    const char* one = verification->poses == 1 ? "s" : "";
+    const bool one = verification->poses == 1;
     const double largest_mps2 = *std::max_element(errors.begin(), errors.end());
     if (const auto axis = contradicted_axis(calibration, *verification)) {
       text += fmt::format(
           "; but {} do{} not confirm it: {} axis {} m/s² rms where the noise alone would leave "
           "{}, largest error {} m/s²",
-          poses, *one == 0 ? "" : "es", kAxisName[*axis],
+          poses, one ? "es" : "", kAxisName[*axis],
           significant(verification->after.pose_rms_mps2[*axis], 2),
           significant(calibration.floor_pose_rms_mps2[*axis], 2), significant(largest_mps2, 2));
     } else {
-      text += fmt::format("; {} confirm{} it to {} m/s²", poses, one, significant(largest_mps2, 2));
+      text += fmt::format("; {} confirm{} it to {} m/s²", poses, one ? "s" : "",
+                          significant(largest_mps2, 2));
     }
   }
   const Decision& decision = calibration.decision;

@@ -21,6 +21,9 @@ std::string conclusion(const RunDescription& description, const Calibration& cal
 /// Errors of both models on another set; the last line says whether the limit is kept.
 std::string evaluation_summary(const Evaluation& evaluation, const std::optional<Limits>& limits);
 
+/// "1 reading", "2 readings"
+std::string counted(std::size_t count, const char* singular);
+
 /// For readings that a calibration is applied to; empty when nothing is lacking.
 std::string caution(const std::vector<std::string>& lacking,
                     const std::vector<std::string>& left_out);

@@ -295,6 +295,9 @@ CertifiedModel certified_model(const Calibration& calibration,
 Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
                     const RunDescription& description, std::optional<BetweenSets> head = {});
 
+/// The axis whose error is the largest multiple of what is expected.
+std::size_t axis_standing_out(const PerAxis<double>& error, const PerAxis<double>& expected);
+
 /// The axis on which fresh poses are further off than the noise of a pose explains (by chance on
 /// one axis of 1000, the uncertainty of the noise included); nothing where they confirm the model.
 std::optional<std::size_t> contradicted_axis(const Calibration& calibration,

@@ -118,22 +118,28 @@ Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
   return result;
 }
 
+std::size_t axis_standing_out(const PerAxis<double>& error, const PerAxis<double>& expected) {
+  const auto ratio = [&](std::size_t axis) {
+    return error[axis] / std::max(1e-300, expected[axis]);
+  };
+  std::size_t worst = 0;
+  for (std::size_t axis = 1; axis < kAxisCount; ++axis)
+    if (ratio(axis) > ratio(worst)) worst = axis;
+  return worst;
+}
+
 std::optional<std::size_t> contradicted_axis(const Calibration& calibration,
                                              const Evaluation& verification) {
   constexpr double kByChance = 1e-3;
   const auto poses = static_cast<double>(verification.poses);
-  const double allowed = std::sqrt(chi_squared_quantile(1 - kByChance, poses) / poses);
-  std::optional<std::size_t> worst;
-  double most = 1;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double expected_mps2 =
-        calibration.floor_pose_rms_mps2[i] + 2 * calibration.u_floor_pose_rms_mps2[i];
-    const double excess =
-        verification.after.pose_rms_mps2[i] / std::max(1e-300, allowed * expected_mps2);
-    if (excess <= most) continue;
-    most = excess;
-    worst = i;
-  }
+  PerAxis<double> allowed_mps2;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    allowed_mps2[i] =
+        std::sqrt(chi_squared_quantile(1 - kByChance, poses) / poses) *
+        (calibration.floor_pose_rms_mps2[i] + 2 * calibration.u_floor_pose_rms_mps2[i]);
+  const PerAxis<double>& error_mps2 = verification.after.pose_rms_mps2;
+  const std::size_t worst = axis_standing_out(error_mps2, allowed_mps2);
+  if (error_mps2[worst] <= allowed_mps2[worst]) return {};
   return worst;
 }
 

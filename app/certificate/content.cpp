@@ -119,11 +119,7 @@ std::string error_sentence(const Composer& c) {
   const Calibration& calibration = c.input.calibration;
   const PerAxis<double>& error = calibration.before.heldout_pose_rms_mps2;
   // One axis throughout: the one that stood out most before anything was added.
-  std::size_t axis = 0;
-  for (std::size_t i = 1; i < kAxisCount; ++i) {
-    const PerAxis<double>& floor = calibration.floor_pose_rms_mps2;
-    if (error[i] * floor[axis] > error[axis] * floor[i]) axis = i;
-  }
+  const std::size_t axis = axis_standing_out(error, calibration.floor_pose_rms_mps2);
   const double floor = calibration.floor_pose_rms_mps2[axis];
   const double after = calibration.after.heldout_pose_rms_mps2[axis];
   if (!calibration.diagnosis.enlarges_model()) {
@@ -153,39 +149,38 @@ void add_summary(const Composer& c) {
   document.summary.push_back(finding(c));
   document.summary.push_back(c.input.scalar != nullptr ? scalar_error_sentence(c)
                                                        : error_sentence(c));
-  const Evaluation* fresh = c.input.verification;
-  if (const auto axis = fresh == nullptr ? std::nullopt : contradicted_axis(calibration, *fresh)) {
-    document.tone = Tone::warning;
-    document.summary.push_back(
-        c.tr("The fresh verification poses do not confirm the model: {} mm/s² RMS on the {} axis, "
-             "where the noise alone would leave {} mm/s².",
-             milli_mps2(fresh->after.pose_rms_mps2[*axis]), kAxisName[*axis],
-             milli_mps2(calibration.floor_pose_rms_mps2[*axis])));
-  }
-  if (c.input.verification != nullptr) {
+  if (const Evaluation* fresh = c.input.verification; fresh != nullptr) {
+    if (const auto axis = contradicted_axis(calibration, *fresh)) {
+      document.tone = Tone::warning;
+      document.summary.push_back(c.tr(
+          "The fresh verification poses do not confirm the model: {} mm/s² RMS on the {} axis, "
+          "where the noise alone would leave {} mm/s².",
+          milli_mps2(fresh->after.pose_rms_mps2[*axis]), kAxisName[*axis],
+          milli_mps2(calibration.floor_pose_rms_mps2[*axis])));
+    }
     const auto worst = [](const PerAxis<double>& v) {
       return *std::max_element(v.begin(), v.end());
     };
-    document.summary.push_back(c.tr(
-        "On {} fresh poses the error is at most {} mm/s² RMS per axis, {} mm/s² at the single "
-        "worst pose.",
-        c.input.verification->poses, milli_mps2(worst(c.input.verification->after.pose_rms_mps2)),
-        milli_mps2(worst(c.input.verification->after.pose_max_abs_mps2))));
+    document.summary.push_back(
+        c.tr("On {} fresh poses the error is at most {} mm/s² RMS per axis, {} mm/s² at the single "
+             "worst pose.",
+             fresh->poses, milli_mps2(worst(fresh->after.pose_rms_mps2)),
+             milli_mps2(worst(fresh->after.pose_max_abs_mps2))));
   }
 }
 
 void add_figures(const Composer& c) {
+  const FigureContext context{c.calibration, c.tr};
+  std::vector<Figure> figures = {residual_map(context, c.input.description.grid),
+                                 residual_histogram(context)};
+  if (auto terms = fitted_terms_figure(context)) figures.push_back(*std::move(terms));
+  figures.push_back(residual_course(context));
   c.add(Heading{c.tr("Pictures of the residual")});
-  const std::size_t last = c.calibration->fitted_terms.empty() ? 3 : 4;
   c.add(Paragraph{
       c.tr("Figures {} to {}: what the model leaves of every pose, measured less calculated and "
            "referred to the input.",
-           c.figures() + 1, c.figures() + last)});
-  const FigureContext context{c.calibration, c.tr};
-  c.add(residual_map(context, c.input.description.grid));
-  c.add(residual_histogram(context));
-  if (auto figure = fitted_terms_figure(context)) c.add(*std::move(figure));
-  c.add(residual_course(context));
+           c.figures() + 1, c.figures() + figures.size())});
+  for (Figure& figure : figures) c.add(std::move(figure));
 }
 
 }  // namespace

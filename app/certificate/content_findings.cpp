@@ -115,8 +115,10 @@ struct NotFound {
 /// Whether it may be there in the place of something that was found.
 bool is_alternative(const std::string& id, const Diagnosis& diagnosis) {
   for (const auto& [name, ambiguity] : diagnosis.findings())
-    for (const std::string& sum : ambiguity.alternatives)
-      if (("+" + sum + "+").find("+" + id + "+") != std::string::npos) return true;
+    for (const std::string& sum : ambiguity.alternatives) {
+      const std::vector<std::string> members = members_of(sum);
+      if (std::find(members.begin(), members.end(), id) != members.end()) return true;
+    }
   return false;
 }
 
@@ -194,13 +196,15 @@ void add_limits(const Composer& c) {
   Table table;
   table.caption = c.tr("95 % confidence limits of these errors, mm/s²");
   table.header = {c.tr("quantity"), "x", "y", "z"};
+  PerAxis<double> independent;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    independent[i] = independent_share(calibration.pose_results, i);
   const auto rows = [&](const std::string& label, const PerAxis<double>& rms, std::size_t poses) {
     std::vector<std::string> of_rms = {c.tr("RMS, {}", label)},
                              of_largest = {c.tr("largest at that RMS, {}", label)};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       const auto n = static_cast<double>(poses);
-      of_rms.push_back(
-          rms_limits(rms[i], std::max(1.0, n * independent_share(calibration.pose_results, i))));
+      of_rms.push_back(rms_limits(rms[i], std::max(1.0, n * independent[i])));
       of_largest.push_back(largest_limits(rms[i], n));
     }
     table.rows.push_back(std::move(of_rms));

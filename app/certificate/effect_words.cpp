@@ -90,15 +90,22 @@ std::string member_by_member(const std::string& id, const Translator& tr,
                              std::string (*words)(const std::string&, const Translator&),
                              const char* between) {
   std::string text;
-  for (std::size_t from = 0; from <= id.size();) {
-    const std::size_t to = std::min(id.find('+', from), id.size());
-    text += (text.empty() ? "" : between) + words(id.substr(from, to - from), tr);
-    from = to + 1;
-  }
+  for (const std::string& member : members_of(id))
+    text += (text.empty() ? "" : between) + words(member, tr);
   return text;
 }
 
 }  // namespace
+
+std::vector<std::string> members_of(const std::string& id) {
+  std::vector<std::string> members;
+  for (std::size_t from = 0; from <= id.size();) {
+    const std::size_t to = std::min(id.find('+', from), id.size());
+    members.push_back(id.substr(from, to - from));
+    from = to + 1;
+  }
+  return members;
+}
 
 std::string effect_name(const std::string& id, const Translator& tr) {
   return member_by_member(id, tr, one_name, " + ");

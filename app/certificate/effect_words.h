@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "app/certificate/language.h"
 #include "estimator/calibrate.h"
@@ -11,6 +12,9 @@ namespace plumbline::app {
 /// "second-order nonlinearity" for "sensor.quadratic"; sums ("a+b") member by member; the id itself
 /// for what has no words.
 std::string effect_name(const std::string& id, const Translator& tr);
+
+/// The ids of which a sum ("a+b") consists.
+std::vector<std::string> members_of(const std::string& id);
 
 /// "x, z"
 std::string axes_text(const std::vector<std::size_t>& axes);

@@ -29,17 +29,15 @@ struct CorrectOptions {
 /// What the reader of corrected readings has to know, one line each.
 std::vector<std::string> cautions_of(const Corrected& corrected, std::size_t skipped_rows) {
   std::vector<std::string> cautions;
-  if (skipped_rows > 0)
-    cautions.push_back(
-        fmt::format("{} bad {} skipped", skipped_rows, skipped_rows == 1 ? "row" : "rows"));
+  if (skipped_rows > 0) cautions.push_back(counted(skipped_rows, "bad row") + " skipped");
   if (auto text = caution(corrected.lacking, corrected.left_out); !text.empty())
     cautions.push_back(std::move(text));
   for (const BeyondRange& column : corrected.beyond) cautions.push_back(caution(column));
   const auto per_axis = [&](const PerAxis<std::size_t>& counts, const char* what) {
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       if (counts[i] == 0) continue;
-      cautions.push_back(fmt::format("caution: {} axis: {} {} {}", kAxisName[i], counts[i],
-                                     counts[i] == 1 ? "reading" : "readings", what));
+      cautions.push_back(fmt::format("caution: {} axis: {} {}", kAxisName[i],
+                                     counted(counts[i], "reading"), what));
     }
   };
   per_axis(corrected.at_rail, "at an end of the converter's range or beyond it");
@@ -122,10 +120,8 @@ void add_correct(CLI::App& program, Invocation& invocation) {
                 "Skip and count rows that cannot be used, instead of refusing the file");
   sub->footer(
       "Effects of the head and the base, of what came before a reading and of one run are left "
-      "out; which ones, the first line of the file says. Lines after it that begin with # say what "
-      "else "
-      "to know: a column that is lacking or lies beyond the calibrated range, readings at an end "
-      "of "
+      "out; which ones, the first line of the file says. Further lines with # say what else to "
+      "know: a column that is lacking or lies beyond the calibrated range, readings at an end of "
       "the converter's range or beyond ±1 g.\n"
       "Exit codes: 0 done; 2 wrong use; 4 internal error.");
   sub->callback(

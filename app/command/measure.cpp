@@ -81,13 +81,12 @@ class OrdersBySignal {
 /// Whether the file can be read and asks for nothing that this rig does not record.
 Result<void> check_own_effects(const std::filesystem::path& path, const RigDescription& rig) {
   if (path.empty()) return {};
-  const auto effects = read_own_effects(path, rig.run.reference_C);
-  if (!effects) return fail(effects.error());
   SampleTable recorded;
   recorded.temp_C = {rig.run.reference_C};
   for (const rig::CovariateSignal& signal : rig.sensor.covariates)
     recorded.covariates.push_back({signal.column, {}});
-  return check_columns(*effects, recorded);
+  const auto effects = own_effects_for(path, rig.run.reference_C, recorded);
+  return effects ? Result<void>{} : fail(effects.error());
 }
 
 Result<ExitCode> calibrate_run(const MeasureRequest& request, storage::RunId run,

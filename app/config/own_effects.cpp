@@ -129,8 +129,8 @@ class OwnEffect final : public Effect {
     for (const Parameter& p : description_.parameters) infos.push_back(p.info);
     return infos;
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    if (!can_be_shown(log, axis)) return {};
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    if (!acts_on(axis)) return {};
     std::vector<Hypothesis> starts = {{}};
     for (const Parameter& p : description_.parameters) {
       std::vector<Hypothesis> longer;
@@ -224,9 +224,7 @@ class OwnEffect final : public Effect {
   static double mean_time_in_pose_s(const VisitLog& log, std::size_t visit) {
     return log.visits[visit].t_mean_s - log.visits[visit].t_arrival_s;
   }
-  bool can_be_shown(const VisitLog& log, std::size_t axis) const {
-    for (const std::string& column : columns())
-      if (!log.has_column(column)) return false;
+  bool acts_on(std::size_t axis) const {
     return subject() == Subject::head ||
            std::find(description_.axes.begin(), description_.axes.end(), axis) !=
                description_.axes.end();
@@ -499,6 +497,14 @@ Result<void> check_columns(const OwnEffects& effects, const SampleTable& samples
     }
   }
   return {};
+}
+
+Result<OwnEffects> own_effects_for(const std::filesystem::path& path, double reference_C,
+                                   const SampleTable& samples) {
+  auto effects = read_own_effects(path, reference_C);
+  if (!effects) return effects;
+  if (auto good = check_columns(*effects, samples); !good) return fail(good.error());
+  return effects;
 }
 
 }  // namespace plumbline::app

@@ -40,4 +40,8 @@ Result<OwnEffects> parse_own_effects(std::string_view text, const std::string& n
 /// Refuses an effect that needs a column which the data do not have.
 Result<void> check_columns(const OwnEffects& effects, const SampleTable& samples);
 
+/// Both: the effects of a file for these data.
+Result<OwnEffects> own_effects_for(const std::filesystem::path& path, double reference_C,
+                                   const SampleTable& samples);
+
 }  // namespace plumbline::app

@@ -90,30 +90,6 @@ std::optional<Alternative> field_of_room(const SearchInput& input, const Candida
 /// Named candidates, alone or, where none does alone, in sums.
 std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateList& list,
                                       const SearchResult& result, std::size_t index,
-                                      const EnlargedParameters& base);
-
-}  // namespace
-
-std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
-                                           const SearchResult& result, std::size_t index) {
-  const Candidate& found = result.evidence[index].candidate;
-  const EnlargedParameters base = without_effect(result.fit.parameters, index);
-  if (found.effect->certain(input.log, found.axis))
-    return proven_rivals(input, list, result, base, found);
-  std::vector<Alternative> rivals = named_rivals(input, list, result, index, base);
-  const bool is_there =
-      std::any_of(result.evidence.begin(), result.evidence.end(),
-                  [](const Evidence& e) { return e.candidate.effect->of_the_room(); });
-  if (found.effect->subject() == Subject::head && !is_there) {
-    if (auto field = field_of_room(input, list, result, base)) rivals.push_back(*std::move(field));
-  }
-  return rivals;
-}
-
-namespace {
-
-std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateList& list,
-                                      const SearchResult& result, std::size_t index,
                                       const EnlargedParameters& base) {
   const Candidate& found = result.evidence[index].candidate;
   const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
@@ -200,5 +176,21 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
 }
 
 }  // namespace
+
+std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
+                                           const SearchResult& result, std::size_t index) {
+  const Candidate& found = result.evidence[index].candidate;
+  const EnlargedParameters base = without_effect(result.fit.parameters, index);
+  if (found.effect->certain(input.log, found.axis))
+    return proven_rivals(input, list, result, base, found);
+  std::vector<Alternative> rivals = named_rivals(input, list, result, index, base);
+  const bool is_there =
+      std::any_of(result.evidence.begin(), result.evidence.end(),
+                  [](const Evidence& e) { return e.candidate.effect->of_the_room(); });
+  if (found.effect->subject() == Subject::head && !is_there) {
+    if (auto field = field_of_room(input, list, result, base)) rivals.push_back(*std::move(field));
+  }
+  return rivals;
+}
 
 }  // namespace plumbline

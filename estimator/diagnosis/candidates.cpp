@@ -20,6 +20,7 @@ double looks_on_axes(const CandidateList& list, const Candidate& candidate) {
 
 void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
                     double handicap) {
+  if (!log.lacking(effect.columns()).empty()) return;
   const std::size_t axes = effect.subject() == Subject::head ? 1 : kAxisCount;
   const auto infos = effect.parameters();
   for (std::size_t axis = 0; axis < axes; ++axis) {

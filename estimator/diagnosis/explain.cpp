@@ -276,7 +276,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
       worst.u_mps2 = result.after.heldout_pose_rms_mps2[i];
     }
   }
-  result.fitted_terms = fitted_terms(log, found.fit.parameters, result.floor_pose_rms_mps2);
+  result.fitted_terms =
+      fitted_terms(log, found.fit.parameters, predicted_V, result.floor_pose_rms_mps2);
   // What is left against the noise that was re-estimated beside the effects: all in all, and of
   // each axis, since what is slow is many times the noise before it is much of χ².
   const double dof = 3 * static_cast<double>(input.poses.size()) -

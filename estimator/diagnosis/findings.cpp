@@ -38,7 +38,6 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
   Eigen::Index row = estimate.parameters.first_free(effect);
   const ActiveEffect& active = estimate.parameters.effects[effect];
   const auto infos = active.effect->parameters();
-  const bool smooth = dynamic_cast<const SmoothTerm*>(active.effect) != nullptr;
   std::vector<double> values = active.p;
   active.effect->normalise(values);
   std::vector<EffectParameter> reported;
@@ -55,9 +54,7 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
       parameter.u = active.effect->choice_uncertainty(log, active.axis, active.p, k);
     }
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
-    // Instants of a smooth term are ends of a range and exact.
-    if (infos[k].role == ParameterRole::index && infos[k].unit == "s" && !smooth)
-      place(log, parameter);
+    if (infos[k].instant) place(log, parameter);
     reported.push_back(std::move(parameter));
   }
   return reported;

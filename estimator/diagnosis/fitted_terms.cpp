@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <numeric>
 
 #include "estimator/effects/driver.h"
@@ -48,19 +49,18 @@ std::vector<const Driver*> likeliest_first(const std::vector<Driver>& drivers, s
 }  // namespace
 
 std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParameters& model,
+                                     const PerAxis<Eigen::VectorXd>& predicted_V,
                                      const PerAxis<double>& expected_mps2) {
   constexpr double kDegPerRad = 1 / effect::kRadPerDeg;
-  const auto whole_V = predict_means_V(log, model);
   const std::vector<Driver> drivers = instantaneous_drivers(log);
-  std::vector<FittedTerm> terms;
-  std::vector<double> size;
+  std::multimap<double, FittedTerm, std::greater<>> by_size;  // equal ones stay in order
   for (std::size_t e = 0; e < model.effects.size(); ++e) {
     const auto without_V = predict_means_V(log, without_effect(model, e));
     FittedTerm term;
     Eigen::VectorXd course_mps2;
     double largest = 0;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const Eigen::VectorXd of_axis = model.mps2_per_V(i) * (whole_V[i] - without_V[i]);
+      const Eigen::VectorXd of_axis = model.mps2_per_V(i) * (predicted_V[i] - without_V[i]);
       const double share = of_axis.norm() / std::max(1e-300, expected_mps2[i]);
       if (!(share > largest)) continue;
       largest = share;
@@ -87,11 +87,10 @@ std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParamete
     if (best->unit() == "rad")
       for (double& at : term.at) at *= kDegPerRad;
     term.term_mps2.assign(course_mps2.begin(), course_mps2.end());
-    const auto place =
-        std::upper_bound(size.begin(), size.end(), largest, std::greater<>()) - size.begin();
-    size.insert(size.begin() + place, largest);
-    terms.insert(terms.begin() + place, std::move(term));
+    by_size.emplace(largest, std::move(term));
   }
+  std::vector<FittedTerm> terms;
+  for (auto& [size, term] : by_size) terms.push_back(std::move(term));
   return terms;
 }
 

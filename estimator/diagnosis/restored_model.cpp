@@ -45,15 +45,12 @@ std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
 
 /// Whether the log has all that the effect is a function of; notes what it lacks.
 bool has_columns_of(const Effect& effect, const VisitLog& log, RestoredModel& restored) {
-  bool all = true;
-  for (const std::string& column : effect.columns()) {
-    if (log.has_column(column)) continue;
-    all = false;
-    if (std::find(restored.lacking.begin(), restored.lacking.end(), column) ==
-        restored.lacking.end())
-      restored.lacking.push_back(column);
+  const std::vector<std::string> lacking = log.lacking(effect.columns());
+  for (const std::string& column : lacking) {
+    auto& noted = restored.lacking;
+    if (std::find(noted.begin(), noted.end(), column) == noted.end()) noted.push_back(column);
   }
-  return all;
+  return lacking.empty();
 }
 
 void restore(const Effect& effect, const std::vector<std::size_t>& axes,

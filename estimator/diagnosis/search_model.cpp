@@ -329,6 +329,13 @@ double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without,
               log_chi_squared_tail((without.chi2 - stage_.fit.chi2) / excess, std::max(1.0, free)));
 }
 
+bool SearchModel::drop(std::size_t effect, const EnlargedFit& without) {
+  if (!adopt(without.parameters)) return false;
+  dropped_.push_back(candidate(effect).family);
+  forget(effect);
+  return true;
+}
+
 double SearchModel::excess(std::size_t effect) const {
   constexpr double kByChance = 1e-6, kMatters = 1.2;
   const ActiveEffect& active = stage_.fit.parameters.effects[effect];
@@ -360,9 +367,7 @@ void SearchModel::drop_what_excess_explains() {
       weakest = k;
       without_weakest = std::move(without);
     }
-    if (!weakest || !adopt(without_weakest.parameters)) return;
-    dropped_.push_back(candidate(*weakest).family);
-    forget(*weakest);
+    if (!weakest || !drop(*weakest, without_weakest)) return;
   }
 }
 
@@ -371,9 +376,7 @@ void SearchModel::drop_superfluous() {
     if (is_certain(candidate(k))) continue;
     const EnlargedFit without = fit_without({k});
     if (!without.determined || p_of_removal(k, without) < false_alarm(candidate(k))) continue;
-    if (!adopt(without.parameters)) continue;
-    dropped_.push_back(candidate(k).family);
-    forget(k);
+    drop(k, without);
   }
 }
 

@@ -101,6 +101,9 @@ class SearchModel {
   void look_closer();
   void leave_ties_open();
   void forget(std::size_t effect);
+  /// Goes on with the fit without an effect, which is not looked for again; false if that cannot
+  /// be.
+  bool drop(std::size_t effect, const EnlargedFit& without);
   /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;
   double p_of_removal(std::size_t effect, const EnlargedFit& without, double excess = 1) const;

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numbers>
 #include <random>
+#include <span>
 #include <tuple>
 
 #include "estimator/effects/smooth_term.h"
@@ -362,22 +363,19 @@ std::string format(const char* pattern, double a, double b = 0, double c = 0) {
   return text;
 }
 
-std::string joined(const std::vector<std::string>& names) {
+std::string joined(const std::vector<std::string>& parts, const char* between) {
   std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  for (const std::string& part : parts) text += (text.empty() ? "" : between) + part;
   return text;
 }
 
 /// What turns along with what: the remedy where no pose of this head and mounting decides.
-std::string by_mounting(const ActiveEffect& found, const Alternative& rival, std::size_t kept) {
-  std::vector<const Effect*> others;
-  for (std::size_t e = 0; e < rival.fit.parameters.effects.size(); ++e)
-    if (e >= kept) others.push_back(rival.fit.parameters.effects[e].effect);
+std::string by_mounting(const ActiveEffect& found, std::span<const ActiveEffect> others) {
   bool other_field = false, other_head = false, other_sensor = false;
-  for (const Effect* other : others) {
-    other_field |= other->of_the_room();
-    other_head |= other->subject() == Subject::head;
-    other_sensor |= other->subject() == Subject::sensor && !other->of_the_room();
+  for (const ActiveEffect& other : others) {
+    other_field |= other.effect->of_the_room();
+    other_head |= other.effect->subject() == Subject::head;
+    other_sensor |= other.effect->subject() == Subject::sensor && !other.effect->of_the_room();
   }
   const bool field = found.effect->of_the_room(), head = found.effect->subject() == Subject::head;
   if ((head && other_field) || (field && other_head))
@@ -394,10 +392,9 @@ std::string by_mounting(const ActiveEffect& found, const Alternative& rival, std
 
 /// Whether a field of the room stands against a displaced head: what is left between them hangs on
 /// how the field enters by the cross sensitivities, of which the model knows nothing.
-bool is_same_to_gravity(const ActiveEffect& found, const Alternative& rival, std::size_t kept) {
-  const auto& effects = rival.fit.parameters.effects;
-  return found.effect->subject() == Subject::head && effects.size() > kept &&
-         std::all_of(effects.begin() + static_cast<std::ptrdiff_t>(kept), effects.end(),
+bool is_same_to_gravity(const ActiveEffect& found, std::span<const ActiveEffect> others) {
+  return found.effect->subject() == Subject::head &&
+         std::all_of(others.begin(), others.end(),
                      [](const ActiveEffect& other) { return other.effect->of_the_room(); });
 }
 
@@ -418,17 +415,24 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
                     const std::vector<Alternative>& all, const HeadReach& reach) {
   Separation separation;
   const ActiveEffect& found = result.fit.parameters.effects[index];
-  const std::size_t kept = result.fit.parameters.effects.size() - 1;
+  // A rival's own effects stand behind those that the model keeps.
+  const auto others_of = [&](const Alternative& rival) {
+    return std::span(rival.fit.parameters.effects)
+        .subspan(result.fit.parameters.effects.size() - 1);
+  };
+  const auto undecided = [&](const Alternative& rival, const std::string& how_far) {
+    return "no poses of this head tell it from " + rival.name + how_far + ": " +
+           by_mounting(found, others_of(rival));
+  };
   std::vector<Alternative> rivals;
+  std::vector<std::string> clauses;
   for (const Alternative& rival : all) {
-    if (!is_same_to_gravity(found, rival, kept)) {
+    if (is_same_to_gravity(found, others_of(rival)))
+      clauses.push_back(undecided(rival, ""));
+    else
       rivals.push_back(rival);
-      continue;
-    }
-    separation.words += (separation.words.empty() ? "" : "; ") +
-                        std::string("no poses of this head tell it from ") + rival.name + ": " +
-                        by_mounting(found, rival, kept);
   }
+  separation.words = joined(clauses, "; ");
   if (rivals.empty()) return separation;
   const Design design(input, result, rivals);
   Proposal proposal = best_proposal(design, within(reach));
@@ -455,23 +459,21 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
         std::minmax_element(proposal.stops.begin(), proposal.stops.end(),
                             [](const Stop& a, const Stop& b) { return a.h_deg < b.h_deg; });
     const bool one = proposal.stops.size() == 1;
-    const std::string others = separation.words;
-    separation.words = format(one ? "%.0f further pose " : "%.0f further poses ",
-                              static_cast<double>(proposal.stops.size())) +
+    clauses.insert(clauses.begin(),
+                   format(one ? "%.0f further pose " : "%.0f further poses ",
+                          static_cast<double>(proposal.stops.size())) +
                        proposal.how + format(" (h from %.0f° to %.0f°)", low->h_deg, high->h_deg) +
-                       condition + (one ? " tells it from " : " tell it from ") + joined(decided) +
-                       format(" by %.1f standard deviations", std::sqrt(least)) +
-                       (others.empty() ? "" : "; " + others);
+                       condition + (one ? " tells it from " : " tell it from ") +
+                       joined(decided, ", ") +
+                       format(" by %.1f standard deviations", std::sqrt(least)));
     separation.plan = {proposal.stops, proposal.samples_factor, std::sqrt(least)};
   }
   for (std::size_t r = 0; r < rivals.size(); ++r) {
     if (proposal.distance[r] >= kDecided) continue;
-    separation.words +=
-        (separation.words.empty() ? "" : "; ") +
-        std::string("no poses of this head tell it from ") + rivals[r].name +
-        format(" (%.1f standard deviations at most): ", std::sqrt(proposal.most[r])) +
-        by_mounting(found, rivals[r], kept);
+    clauses.push_back(undecided(
+        rivals[r], format(" (%.1f standard deviations at most)", std::sqrt(proposal.most[r]))));
   }
+  separation.words = joined(clauses, "; ");
   return separation;
 }
 

@@ -105,7 +105,7 @@ struct Column {
 std::vector<Column> recorded_columns(const VisitLog& log) {
   std::vector<Column> columns;
   if (log.has_temperature) {
-    Column& temperature = columns.emplace_back(Column{"temp_C", {}});
+    Column& temperature = columns.emplace_back(Column{kTemperatureColumn, {}});
     for (const Visit& visit : log.visits) temperature.value.push_back(visit.temperature_K);
   }
   for (std::size_t c = 0; c < log.covariate_names.size(); ++c) {

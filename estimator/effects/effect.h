@@ -11,6 +11,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "estimator/effects/visit_log.h"
@@ -32,6 +33,8 @@ struct ParameterInfo {
   bool place = false;  ///< shape: a place, which may be zero or negative, and not a size
   /// How something went that nothing recorded says: a program needs it, a reader does not.
   bool unrecorded = false;
+  /// Index: when something happened, which lies somewhere between two samples.
+  bool instant = false;
 };
 
 /// Where the search begins: shapes and indices at given values, amplitudes at a small typical size
@@ -75,7 +78,7 @@ class Effect {
   virtual Subject subject() const = 0;
   virtual std::vector<ParameterInfo> parameters() const = 0;
   /// Starting points on these data for `axis` (0 for the head); empty when the data cannot show the
-  /// effect at all (no temperature recorded, say).
+  /// effect at all. Precondition: the log has all of columns().
   virtual std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const = 0;
   /// Hypotheses close to `hypothesis`, too many to search among all the others; the one that the
   /// search chose is compared with these.
@@ -173,6 +176,12 @@ inline constexpr std::size_t kPartsOfDwell = 8;
 inline constexpr double kSmallTerm = 1e-3;
 inline constexpr double kSmallAngle_deg = 0.02;
 
+/// A parameter that says when something happened.
+inline ParameterInfo instant(std::string name) {
+  ParameterInfo info{std::move(name), "s", ParameterRole::index};
+  info.instant = true;
+  return info;
+}
 /// How many positions a turn has, as closely as two of these angles lie together. Harmonics of more
 /// than half of that look like lower ones.
 int positions_of_a_turn(std::vector<double> angles_rad);

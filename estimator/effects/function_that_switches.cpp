@@ -18,7 +18,7 @@ class Pulses final : public DrivenTerm {
   std::vector<ParameterInfo> parameters() const override {
     constexpr double kFine = 0.1;  // of an edge, so that some readings are in it
     const double fine = kFine * edge();
-    return {{"edge", "s", ParameterRole::index},
+    return {effect::instant("edge"),
             {"period", "s", ParameterRole::shape, fine},
             {"width", "s", ParameterRole::shape, fine},
             {"middle", "s", ParameterRole::shape, fine, true},
@@ -93,8 +93,8 @@ class Window final : public DrivenTerm {
 
   std::vector<ParameterInfo> parameters() const override {
     // Between two visits nothing moves a sharp edge.
-    return {{"from", "s", ParameterRole::index},
-            {"to", "s", ParameterRole::index},
+    return {effect::instant("from"),
+            effect::instant("to"),
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   /// Few: two steps that cancel, or a train, lead to all others.
@@ -149,7 +149,7 @@ class Relaxation final : public DrivenTerm {
       : DrivenTerm(std::move(clock), target), longest_s_(longest_s) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"from", "s", ParameterRole::index},
+    return {effect::instant("from"),
             {"tau", "s", ParameterRole::shape},
             {"p", target().unit(), ParameterRole::amplitude}};
   }

@@ -14,7 +14,7 @@ class BiasStep final : public Effect {
   Subject subject() const override { return Subject::sensor; }
   bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"b", "g", ParameterRole::amplitude}, {"t0", "s", ParameterRole::index}};
+    return {{"b", "g", ParameterRole::amplitude}, effect::instant("t0")};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     std::vector<Hypothesis> starts;

@@ -11,8 +11,7 @@ class TemperatureScale final : public Effect {
   std::vector<ParameterInfo> parameters() const override {
     return {{"s1", "1/K", ParameterRole::amplitude}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    if (!log.has_temperature) return {};
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     return {{{effect::kSmallTerm}}};
   }
   std::vector<std::string> columns() const override { return {kTemperatureColumn}; }

@@ -163,9 +163,12 @@ std::array<int, 3> direction_after(const Visit& before, double delta_rad) {
   return direction;
 }
 
-bool VisitLog::has_column(const std::string& name) const {
-  if (name == kTemperatureColumn) return has_temperature;
-  return std::find(covariate_names.begin(), covariate_names.end(), name) != covariate_names.end();
+std::vector<std::string> VisitLog::lacking(std::vector<std::string> columns) const {
+  std::erase_if(columns, [&](const std::string& name) {
+    if (name == kTemperatureColumn) return has_temperature;
+    return std::find(covariate_names.begin(), covariate_names.end(), name) != covariate_names.end();
+  });
+  return columns;
 }
 
 RunHistory history_of(const VisitLog& log) {

@@ -40,9 +40,10 @@ struct VisitLog {
   std::vector<Visit> visits;
   double gamma = 1;  ///< local over standard gravity
   bool has_temperature = false;
-  std::vector<std::string> covariate_names;        ///< in the order of Visit::covariate
-  bool has_column(const std::string& name) const;  ///< recorded, temperature included
-  PerAxis<double> sample_sd_V{};                   ///< white noise of one sample, within the dwells
+  std::vector<std::string> covariate_names;  ///< in the order of Visit::covariate
+  /// Those of `columns` that were not recorded (kTemperatureColumn among them).
+  std::vector<std::string> lacking(std::vector<std::string> columns) const;
+  PerAxis<double> sample_sd_V{};  ///< white noise of one sample, within the dwells
   /// The same before the converter: freed of what rounding and stuck bits do to it.
   PerAxis<double> input_sd_V{};
   PerAxis<CodeFaults> codes;                ///< where a converter is declared

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <numeric>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "estimator/calibrate.h"
@@ -108,6 +109,20 @@ TEST(Findings, AStepWhileTheHeadRestsIsOneStep) {
   EXPECT_NEAR(step.parameters[1].value, 121.075, 4 * step.parameters[1].u);
   EXPECT_GT(step.parameters[1].u, 0);
   EXPECT_LT(step.parameters[1].u, 0.01);
+}
+
+TEST(Findings, AWindowBeginsAndEndsBetweenTwoSamples) {
+  SyntheticOptions options;
+  options.more_V[0] = [](const auto&, double t_s) { return t_s > 120 && t_s < 180 ? 2e-3 : 0; };
+  const Calibration result = calibrated(synthetic_run(6, kSixteenBits, options));
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U) << result.diagnosis.reason;
+  const UnlistedStructure& window = result.diagnosis.unlisted.front();
+  ASSERT_GE(window.parameters.size(), 2U);
+  // A pose comes every 3 s.
+  for (const auto& [k, true_s] : {std::pair{0U, 120.0}, std::pair{1U, 180.0}}) {
+    EXPECT_GT(window.parameters[k].u, 0) << window.parameters[k].name;
+    EXPECT_NEAR(window.parameters[k].value, true_s, 1.5);
+  }
 }
 
 TEST(Evaluate, AnEffectThatIsThereTwiceCountsTwice) {
