@@ -326,21 +326,22 @@ Eigen::VectorXd error_figures(const Experiment& experiment, const AxisWork& work
   return heldout;
 }
 
-UncertaintyReport uncertainty_of(const CalibrationInput& input, const PerAxis<AxisWork>& work,
-                                 std::uint64_t seed) {
-  PerAxis<PropagationAxis> axes;
+/// The fit of every axis by itself; `inflation` of its covariance.
+PropagatedEstimate propagated(const PerAxis<AxisWork>& work, const PerAxis<double>& inflation) {
+  PropagatedEstimate estimate;
+  estimate.covariance = Eigen::MatrixXd::Zero(4 * kAxisCount, 4 * kAxisCount);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const AxisWork& w = work[axis];
-    PropagationAxis& a = axes[axis];
-    a.value = w.fit.estimate.value;
-    a.gain = w.fit.gain;
+    const auto first = 4 * static_cast<Eigen::Index>(axis);
+    estimate.value[axis] = w.fit.estimate.value;
+    estimate.gain[axis] = Eigen::MatrixXd::Zero(4 * kAxisCount, w.y.size());
+    estimate.gain[axis].middleRows<4>(first) = w.fit.gain;
+    estimate.covariance.block<4, 4>(first, first) = inflation[axis] * w.fit.estimate.covariance;
     // Rounding that was estimated from the codes is part of the noise there.
-    a.rounding_V2 = w.quantized ? Eigen::VectorXd(Eigen::VectorXd::Zero(w.y.size()))
-                                : Eigen::VectorXd(w.own_V2 - w.known_V2);
-    const Eigen::VectorXd own_V2 = a.rounding_V2 + w.known_V2;
-    a.noise = w.fit.estimate.covariance - a.gain * own_V2.asDiagonal() * a.gain.transpose();
+    estimate.rounding_V2[axis] = w.quantized ? Eigen::VectorXd(Eigen::VectorXd::Zero(w.y.size()))
+                                             : Eigen::VectorXd(w.own_V2 - w.known_V2);
   }
-  return propagate_uncertainty({input.run.poses, input.description, axes}, seed);
+  return estimate;
 }
 
 }  // namespace
@@ -395,6 +396,7 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   verdict.poses = n;
   double worst_error_mps2 = -1;
   double u_worst_mps2 = 0;
+  PerAxis<double> inflation{};
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const AxisWork& w = work[axis];
     if (w.quantized) result.quantization[axis] = w.quantized->use;
@@ -415,10 +417,10 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
 
     // An axis whose residual the noise does not explain is less certain than the noise says.
     const bool unexplained = is_unexplained(verdict, axis);
-    const double inflation = unexplained ? std::max(1.0, w.test.chi2 / w.test.dof) : 1.0;
-    follow_convergence(experiment, w, inflation, axis, result.convergence);
+    inflation[axis] = unexplained ? std::max(1.0, w.test.chi2 / w.test.dof) : 1.0;
+    follow_convergence(experiment, w, inflation[axis], axis, result.convergence);
     result.estimates.batch_ls[axis] =
-        with_gravity(w.fit.estimate, input.description.gravity, inflation);
+        with_gravity(w.fit.estimate, input.description.gravity, inflation[axis]);
     (*result.estimates.rls)[axis] = result.convergence.rls.back()[axis];
     result.estimates.ekf[axis] = result.convergence.ekf.back()[axis];
     result.estimates.agreement_en[axis] =
@@ -453,6 +455,7 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   result.final = result.estimates;
   result.final.rls.reset();
   result.after = result.before;
+  PropagatedEstimate certified = propagated(work, inflation);
   if (result.diagnosis.verdict != Verdict::undetermined) {
     ExplainInput explain_input{input,
                                *log,
@@ -467,12 +470,14 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
       explain_input.known_V2[axis] = work[axis].known_V2;
       explain_input.pooled[axis] = work[axis].pooled;
     }
-    if (const auto worst = explain(explain_input, options, result)) {
-      worst_error_mps2 = worst->error_mps2;
-      u_worst_mps2 = worst->u_mps2;
+    if (auto explained = explain(explain_input, options, result)) {
+      worst_error_mps2 = explained->worst_error_mps2;
+      u_worst_mps2 = explained->u_worst_mps2;
+      certified = std::move(explained->estimate);
     }
   }
-  result.uncertainty = uncertainty_of(input, work, options.seed);
+  result.uncertainty =
+      propagate_uncertainty(certified, input.run.poses, input.description, options.seed);
   if (input.description.limits && worst_error_mps2 >= 0)
     result.decision =
         decide(input.description.limits->max_abs_error_mps2, worst_error_mps2, u_worst_mps2);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "app/certificate/rounding.h"
+#include "estimator/effects/covariate.h"
 
 namespace plumbline::app {
 namespace {
@@ -61,8 +62,6 @@ constexpr std::array<EffectWords, 30> kEffects = {{
      "m1 and m2 times the horizontal axes of the base as the triad sees them"},
 }};
 
-constexpr std::string_view kCovariate = "covariate:";
-
 const EffectWords* words_of(const std::string& id) {
   const auto* it = std::find_if(kEffects.begin(), kEffects.end(),
                                 [&](const EffectWords& words) { return id == words.id; });
@@ -71,18 +70,18 @@ const EffectWords* words_of(const std::string& id) {
 
 std::string one_name(const std::string& id, const Translator& tr) {
   if (const EffectWords* words = words_of(id)) return tr(words->name);
-  if (id.starts_with(kCovariate)) {
-    return tr("influence of the recorded column {}", id.substr(kCovariate.size()));
-  }
+  if (const auto column = covariate_column(id))
+    return tr("influence of the recorded column {}", *column);
   return id;
 }
 
 std::string one_term(const std::string& id, const Translator& tr) {
   if (const EffectWords* words = words_of(id)) return tr(words->term);
-  if (!id.starts_with(kCovariate)) return {};
+  const auto column = covariate_column(id);
+  if (!column) return {};
   return tr(
       "c·(v − mean) with c in g per unit, c·(v − mean)·a_i with c per unit; v is the column {}",
-      id.substr(kCovariate.size()));
+      *column);
 }
 
 /// Of the members of a sum of effects.

@@ -88,6 +88,8 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"the drive has lost its homing", "привод утратив нуль відліку"},
     {"the drive answers again", "привод знову відповідає"},
     {"no safe state confirmed ({})", "безпечного стану не підтверджено ({})"},
+    {"the head still moves {} s after it was stopped",
+     "головка рухається ще через {} s після зупинки"},
     {"the drive's own watchdog stops the motors", "двигуни зупиняє власний сторожовий таймер привода"},
     {"the head has not arrived at {} within {} s", "головка не дійшла до {} за {} s"},
     {"it stands at {}", "вона стоїть на {}"},

@@ -1,5 +1,7 @@
 #include "app/io/uncertainty_json.h"
 
+#include <cmath>
+
 namespace plumbline::app {
 
 namespace {
@@ -8,7 +10,7 @@ Json to_json(const ParameterUncertainty& parameter) {
   const ParameterBudget& budget = parameter.budget;
   return {{"budget",
            {{"noise", json_number(budget.noise)},
-            {"positioning", json_number(budget.positioning)},
+            {"positioning", json_number(std::hypot(budget.delta, budget.h))},
             {"rounding", json_number(budget.rounding)},
             {"gravity", json_number(budget.gravity)},
             {"combined", json_number(budget.combined)}}},
@@ -25,7 +27,7 @@ Json to_json(const ParameterUncertainty& parameter) {
 }  // namespace
 
 Json uncertainty_json(const UncertaintyReport& report) {
-  Json json = {{"of", "estimates.batch_ls"},
+  Json json = {{"of", "final.batch_ls"},
                {"coverage", 0.95},
                {"trials", report.trials},
                {"stabilised", report.stabilised},

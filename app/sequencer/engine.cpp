@@ -17,6 +17,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr double kHomingLimit_s = 180.0;
+constexpr int kStandstillLimit_s = 5;  // of the host's clock: a drive that was told to stop brakes
 constexpr milliseconds kFirstSampleWait{100};
 /// Nodes send their identity about once a second (sensor's clock).
 constexpr double kIdentityWait_s = 10.0;
@@ -303,16 +304,30 @@ Engine::Outcome<void> Engine::home() {
   return {};
 }
 
+Engine::Outcome<void> Engine::stand_still() {
+  if (auto stopped = asked(head_.stop()); !stopped) return stopped;
+  using Clock = std::chrono::steady_clock;
+  const auto limit = Clock::now() + std::chrono::seconds{kStandstillLimit_s};
+  while (!control_.abort_requested()) {
+    auto status = asked(head_.status());
+    if (!status) return tl::unexpected(status.error());
+    if (!status->moving) break;
+    if (Clock::now() > limit)
+      return repeat(
+          fmt::format("the head still moves {} s after it was stopped", kStandstillLimit_s));
+    std::this_thread::sleep_for(options_.poll_interval);
+  }
+  return asked(head_.arm_watchdog(milliseconds{0}));
+}
+
 Result<void> Engine::end(const Outcome<void>& outcome) {
   enter(EngineState::stopping, outcome ? "the plan is done" : outcome.error().error.message);
   // Whoever asks to stop wants to know that the motors stand still; whoever aborts, has no time.
   if (!head_answers_ && !control_.abort_requested()) static_cast<void>(asked(head_.connect()));
-  auto stopped = asked(head_.stop());
-  if (stopped) stopped = asked(head_.arm_watchdog(milliseconds{0}));
-  if (!stopped) {
+  if (auto safe = stand_still(); !safe) {
     note("fault",
          fmt::format("no safe state confirmed ({}); the drive's own watchdog stops the motors",
-                     stopped.error().error.message));
+                     safe.error().error.message));
   }
   const rig::SourceStatistics bus = acquisition_.statistics();
   note("bus", fmt::format("{} samples received, {} lost; {} wrong checksums, {} out of order, {} "

@@ -124,6 +124,9 @@ class Engine {
   Outcome<void> compare_with_earlier(const StartPoint& start);
   const PlanStep* next_step(const Plan& plan, bool put_off) const;
   Outcome<void> home();
+  /// Stops the motors, waits until they do stand still (unless aborted), and only then relieves the
+  /// drive's watchdog.
+  Outcome<void> stand_still();
   Result<void> end(const Outcome<void>& outcome);
 
   // engine_pose.cpp: one pose.

@@ -142,6 +142,22 @@ Eigen::MatrixXd with_allowances(const SearchInput& search, const SearchResult& f
   return covariance;
 }
 
+/// How the twelve follow from the means, about the fit: its Gauss–Newton step. The covariance is to
+/// be filled in.
+PropagatedEstimate propagated(const VisitLog& log, const EnlargedFit& fit,
+                              const PoseWhitening& whitening) {
+  PropagatedEstimate estimate;
+  const auto n = std::ssize(log.visits);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto of_axis = fit.whitened_jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
+    estimate.value[i] = fit.parameters.twelve[i];
+    estimate.gain[i] =
+        fit.covariance.topRows(4 * kAxisCount) * of_axis.transpose() * whitening.inverse[i];
+    estimate.rounding_V2[i] = Eigen::VectorXd::Zero(n);
+  }
+  return estimate;
+}
+
 /// Whether what is left of an axis is clearly more than its noise leaves.
 bool is_far_beyond(double rms_mps2, const AxisVerdictInput& noise) {
   constexpr double kRatio = 1.5, kStandardUncertainties = 5;
@@ -151,8 +167,8 @@ bool is_far_beyond(double rms_mps2, const AxisVerdictInput& noise) {
 
 }  // namespace
 
-std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
-                                  Calibration& result) {
+std::optional<Explained> explain(const ExplainInput& input, const CalibrationOptions& options,
+                                 Calibration& result) {
   const VisitLog& log = input.log;
   const Observations observed = observe(input.input.run, log);
   EnlargedParameters start;
@@ -173,7 +189,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     add_noise(input.noise_follows, model, diagnosis);
     add_noise(wanders_beyond_record(search, found), model, diagnosis);
   };
-  const auto without_effects = [&]() -> std::optional<WorstError> {
+  const auto without_effects = [&]() -> std::optional<Explained> {
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
     add_noise_to(result.diagnosis, {});
     return std::nullopt;
@@ -194,6 +210,13 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     heldout_errors_mps2[i] += found.fit.parameters.mps2_per_V(i) *
                               (stated_V[i] - found.observed.mean_V[i]).replicate<2, 1>();
   const Eigen::MatrixXd under_this_noise = found.fit.covariance;
+  Explained explained;
+  explained.estimate = codes ? propagated(estimated_log, codes->before_converter.fit,
+                                          codes->before_converter.whitening)
+                             : propagated(log, found.fit, found.whitening);
+  // Rounding that was estimated from the codes is part of the noise.
+  for (std::size_t i = 0; i < kAxisCount && !codes; ++i)
+    explained.estimate.rounding_V2[i] = found.own_V2[i] - input.known_V2[i];
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
   if (codes) {
     SearchResult& before = codes->before_converter;
@@ -205,6 +228,8 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     found.fit.covariance =
         with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
   }
+  explained.estimate.covariance =
+      found.fit.covariance.topLeftCorner(4 * kAxisCount, 4 * kAxisCount);
   Diagnosis diagnosis =
       describe_findings(search, searched.candidates, found, options.reach.value_or(reach_of(log)));
   attach_gains(found.evidence, searched.gains, diagnosis);
@@ -232,7 +257,6 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   for (const ActiveEffect& active : found.fit.parameters.effects)
     for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
   PerAxis<std::optional<AxisVerdictInput>> residual;
-  WorstError worst;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = found.fit.parameters.mps2_per_V(i);
@@ -271,9 +295,9 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
     for (Eigen::Index k = 0; k < residual_mps2.size(); ++k) {
       result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[i] = residual_mps2(k);
     }
-    if (result.after.heldout_pose_max_abs_mps2[i] > worst.error_mps2) {
-      worst.error_mps2 = result.after.heldout_pose_max_abs_mps2[i];
-      worst.u_mps2 = result.after.heldout_pose_rms_mps2[i];
+    if (result.after.heldout_pose_max_abs_mps2[i] > explained.worst_error_mps2) {
+      explained.worst_error_mps2 = result.after.heldout_pose_max_abs_mps2[i];
+      explained.u_worst_mps2 = result.after.heldout_pose_rms_mps2[i];
     }
   }
   result.fitted_terms =
@@ -292,7 +316,7 @@ std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOp
   add_noise_to(diagnosis, found.fit.parameters);
   diagnosis.reason = reason_of_findings(residual, diagnosis.reason, result.after.fit_pose_rms_mps2);
   result.diagnosis = std::move(diagnosis);
-  return worst;
+  return explained;
 }
 
 }  // namespace plumbline

@@ -10,6 +10,7 @@
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/reml.h"
 #include "estimator/pose_means.h"
+#include "estimator/uncertainty/monte_carlo.h"
 
 namespace plumbline {
 
@@ -25,16 +26,17 @@ struct ExplainInput {
   PerAxis<PooledNoise> pooled;        ///< of the pose means beside the 12 parameters
 };
 
-/// The largest error on left-out poses after effects were added.
-struct WorstError {
-  double error_mps2 = 0;
-  double u_mps2 = 0;
+/// What comes of a calibration after effects were added.
+struct Explained {
+  double worst_error_mps2 = 0;  ///< the largest on left-out poses
+  double u_worst_mps2 = 0;
+  PropagatedEstimate estimate;  ///< the twelve of the enlarged model
 };
 
 /// Searches the residual of a finished 12-parameter calibration. When effects are found and lower
 /// the error on left-out poses, fills diagnosis, final, after, floor and residual_after of `result`
-/// and returns the worst error; otherwise leaves `result` as it is.
-std::optional<WorstError> explain(const ExplainInput& input, const CalibrationOptions& options,
-                                  Calibration& result);
+/// and says what else came of it; otherwise leaves `result` as it is.
+std::optional<Explained> explain(const ExplainInput& input, const CalibrationOptions& options,
+                                 Calibration& result);
 
 }  // namespace plumbline

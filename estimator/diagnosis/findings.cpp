@@ -23,11 +23,12 @@ void place(const VisitLog& log, EffectParameter& instant) {
   if (after == log.visits.begin()) return;
   const Visit& before = *std::prev(after);
   const auto count = static_cast<double>(before.count);
-  if (after == log.visits.end() || after->t_arrival_s > instant.value) {
+  const double end_s = before.t_arrival_s + before.step_s * (count - 1);
+  const bool nothing_after = after == log.visits.end();
+  if (instant.value <= end_s || nothing_after) {
     instant.u = before.step_s * count / (effect::kPartsOfDwell * std::sqrt(12.0));
     return;
   }
-  const double end_s = before.t_arrival_s + before.step_s * (count - 1);
   instant.value = 0.5 * (end_s + after->t_arrival_s);
   instant.u = (after->t_arrival_s - end_s) / std::sqrt(12.0);
 }

@@ -43,14 +43,25 @@ std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
   return found;
 }
 
-/// Whether the log has all that the effect is a function of; notes what it lacks.
-bool has_columns_of(const Effect& effect, const VisitLog& log, RestoredModel& restored) {
-  const std::vector<std::string> lacking = log.lacking(effect.columns());
+/// Whether the log has these columns; notes what it lacks.
+bool has_columns(std::vector<std::string> columns, const VisitLog& log, RestoredModel& restored) {
+  const std::vector<std::string> lacking = log.lacking(std::move(columns));
   for (const std::string& column : lacking) {
     auto& noted = restored.lacking;
     if (std::find(noted.begin(), noted.end(), column) == noted.end()) noted.push_back(column);
   }
   return lacking.empty();
+}
+
+/// The column behind a driver, if it is one that the calibration run recorded.
+std::vector<std::string> columns_behind(const std::string& driver, const RunHistory& history) {
+  const std::string column = driver.substr(0, driver.rfind(".rate"));
+  const auto& names = history.covariate_names;
+  const bool recorded = column == kTemperatureColumn
+                            ? history.has_temperature
+                            : std::find(names.begin(), names.end(), column) != names.end();
+  if (!recorded) return {};
+  return {column};
 }
 
 void restore(const Effect& effect, const std::vector<std::size_t>& axes,
@@ -74,7 +85,7 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
   for (const FoundEffect& found : model.effects) {
     const std::size_t before = parameters.effects.size();
     for (const Effect* effect : named)
-      if (effect->id() == found.id && has_columns_of(*effect, log, restored))
+      if (effect->id() == found.id && has_columns(effect->columns(), log, restored))
         restore(*effect, found.axes, found.parameters, parameters);
     for (const auto& effect : restored.owned) {
       // Bias and scale form of a column share the id; the unit of c tells them apart.
@@ -83,13 +94,19 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
         restore(*effect, found.axes, found.parameters, parameters);
       }
     }
-    if (parameters.effects.size() == before) restored.left_out.push_back(found.id);
+    if (parameters.effects.size() > before) continue;
+    restored.left_out.push_back(found.id);
+    if (const auto column = covariate_column(found.id)) has_columns({*column}, log, restored);
   }
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   if (!model.unlisted.empty()) terms = smooth_terms(log, SmoothTermSelection::any);
   for (const UnlistedStructure& found : model.unlisted) {
     if (found.is_of_noise()) continue;  // it is in no mean
     const std::size_t before = parameters.effects.size();
+    if (!has_columns(columns_behind(found.driver, model.history), log, restored)) {
+      restored.left_out.push_back("unlisted: " + found.driver);
+      continue;
+    }
     if (const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape))
       restore(*term, found.axes, found.parameters, parameters);
     if (parameters.effects.size() == before)

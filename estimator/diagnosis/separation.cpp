@@ -267,14 +267,18 @@ class Design {
 };
 
 std::vector<Stop> within(const HeadReach& reach) {
+  const double bottom_deg = std::ceil(std::max(reach.h_min_deg, -90.0) / kH_step_deg) * kH_step_deg;
+  const double first_deg = std::ceil(reach.delta_min_deg / kDelta_step_deg) * kDelta_step_deg;
+  const auto count = [](double first, double last, double step) {
+    return static_cast<int>(std::floor((last - first) / step + 1e-9)) + 1;
+  };
+  const int rings = count(bottom_deg, std::min(reach.h_max_deg, 90.0), kH_step_deg);
+  const int in_ring =
+      count(first_deg, std::min(reach.delta_max_deg, reach.delta_min_deg + 345), kDelta_step_deg);
   std::vector<Stop> stops;
-  const double last_deg = std::min(reach.delta_max_deg, reach.delta_min_deg + 345);
-  const double top_deg = std::min(reach.h_max_deg, 90.0);
-  for (double h = std::ceil(std::max(reach.h_min_deg, -90.0) / kH_step_deg) * kH_step_deg;
-       h <= top_deg + 1e-9; h += kH_step_deg)
-    for (double delta = std::ceil(reach.delta_min_deg / kDelta_step_deg) * kDelta_step_deg;
-         delta <= last_deg + 1e-9; delta += kDelta_step_deg)
-      stops.push_back({delta, h});
+  for (int ring = 0; ring < rings; ++ring)
+    for (int k = 0; k < in_ring; ++k)
+      stops.push_back({first_deg + k * kDelta_step_deg, bottom_deg + ring * kH_step_deg});
   return stops;
 }
 
@@ -361,6 +365,14 @@ std::string format(const char* pattern, double a, double b = 0, double c = 0) {
   char text[160];
   std::snprintf(text, sizeof text, pattern, a, b, c);
   return text;
+}
+
+/// For the words: " (h from 0° to 80°)".
+std::string heights(const std::vector<Stop>& stops) {
+  const auto [low, high] = std::minmax_element(
+      stops.begin(), stops.end(), [](const Stop& a, const Stop& b) { return a.h_deg < b.h_deg; });
+  return low->h_deg == high->h_deg ? format(" (h = %.0f°)", low->h_deg)
+                                   : format(" (h from %.0f° to %.0f°)", low->h_deg, high->h_deg);
 }
 
 std::string joined(const std::vector<std::string>& parts, const char* between) {
@@ -455,17 +467,13 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
     least = std::min(least, proposal.distance[r]);
   }
   if (!decided.empty()) {
-    const auto [low, high] =
-        std::minmax_element(proposal.stops.begin(), proposal.stops.end(),
-                            [](const Stop& a, const Stop& b) { return a.h_deg < b.h_deg; });
     const bool one = proposal.stops.size() == 1;
-    clauses.insert(clauses.begin(),
-                   format(one ? "%.0f further pose " : "%.0f further poses ",
-                          static_cast<double>(proposal.stops.size())) +
-                       proposal.how + format(" (h from %.0f° to %.0f°)", low->h_deg, high->h_deg) +
-                       condition + (one ? " tells it from " : " tell it from ") +
-                       joined(decided, ", ") +
-                       format(" by %.1f standard deviations", std::sqrt(least)));
+    clauses.insert(clauses.begin(), format(one ? "%.0f further pose " : "%.0f further poses ",
+                                           static_cast<double>(proposal.stops.size())) +
+                                        proposal.how + heights(proposal.stops) + condition +
+                                        (one ? " tells it from " : " tell it from ") +
+                                        joined(decided, ", ") +
+                                        format(" by %.1f standard deviations", std::sqrt(least)));
     separation.plan = {proposal.stops, proposal.samples_factor, std::sqrt(least)};
   }
   for (std::size_t r = 0; r < rivals.size(); ++r) {

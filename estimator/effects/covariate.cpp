@@ -7,12 +7,14 @@
 namespace plumbline {
 namespace {
 
+const std::string kIdBegin = "covariate:";
+
 class CovariateEffect final : public Effect {
  public:
   CovariateEffect(std::string column, std::size_t index, bool scale)
       : column_(std::move(column)), index_(index), scale_(scale) {}
 
-  std::string id() const override { return "covariate:" + column_; }
+  std::string id() const override { return kIdBegin + column_; }
   Subject subject() const override { return Subject::sensor; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"c", scale_ ? "1/unit" : "g/unit", ParameterRole::amplitude},
@@ -50,6 +52,11 @@ std::vector<std::unique_ptr<Effect>> covariate_effects(const VisitLog& log) {
     }
   }
   return effects;
+}
+
+std::optional<std::string> covariate_column(const std::string& id) {
+  if (!id.starts_with(kIdBegin)) return std::nullopt;
+  return id.substr(kIdBegin.size());
 }
 
 }  // namespace plumbline

@@ -70,38 +70,41 @@ Eigen::MatrixXd root_of(const Eigen::MatrixXd& covariance) {
 
 /// Everything about the poses that a trial needs, computed once.
 struct Model {
-  const PropagationInput& input;
+  const PropagatedEstimate& estimate;
+  Eigen::Index poses;
   double u_delta_rad, u_h_rad, u_gamma;
   /// Outputs' derivatives by δ and h and halves of the second ones, V: n × 5 per axis
   /// [δ, h, δδ, δh, hh].
-  PerAxis<Eigen::MatrixXd> slope;
-  PerAxis<Eigen::VectorXd> rounding_half_V;
-  PerAxis<Eigen::Matrix4d> noise_root;
+  PerAxis<Eigen::MatrixXd> slope{};
+  PerAxis<Eigen::VectorXd> rounding_half_V{};
   PerAxis<bool> rounds{};
+  Eigen::MatrixXd by_delta{}, by_h{};  ///< 12 × n, parameters' deviations by one u of each angle
+  Eigen::MatrixXd noise{};             ///< 12 × 12, what the covariance holds beside the others
+  Eigen::MatrixXd noise_root{};
   /// Whether angles of these uncertainties bend the outputs enough to be felt. If not, what they do
   /// to the parameters is Gaussian, 12 × 12, and is drawn as such instead of angle by angle.
   bool bends = false;
-  Eigen::MatrixXd angle_root;
+  Eigen::MatrixXd angle_root{};
 };
 
-/// Twelve parameters' deviations by one of the slopes of each pose, 12 × n.
+/// Twelve parameters' deviations by one of the slopes of each pose, which all axes share, 12 × n.
 Eigen::MatrixXd through_gain(const Model& model, Eigen::Index slope) {
-  Eigen::MatrixXd shift(kParameters, std::ssize(model.input.poses));
+  Eigen::MatrixXd shift = Eigen::MatrixXd::Zero(kParameters, model.poses);
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    shift.middleRows<4>(4 * static_cast<Eigen::Index>(i)) =
-        model.input.axis[i].gain * model.slope[i].col(slope).asDiagonal();
+    shift += model.estimate.gain[i] * model.slope[i].col(slope).asDiagonal();
   return shift;
 }
 
 void decide_on_angles(Model& model) {
   constexpr double kFelt = 1e-3;  // of what the straight part does
   const double u_delta = model.u_delta_rad, u_h = model.u_h_rad;
-  const Eigen::MatrixXd by_delta = u_delta * through_gain(model, 0),
-                        by_h = u_h * through_gain(model, 1),
-                        by_delta2 = u_delta * u_delta * through_gain(model, 2),
+  model.by_delta = u_delta * through_gain(model, 0);
+  model.by_h = u_h * through_gain(model, 1);
+  const Eigen::MatrixXd by_delta2 = u_delta * u_delta * through_gain(model, 2),
                         by_both = u_delta * u_h * through_gain(model, 3),
                         by_h2 = u_h * u_h * through_gain(model, 4);
-  const Eigen::MatrixXd covariance = by_delta * by_delta.transpose() + by_h * by_h.transpose();
+  const Eigen::MatrixXd covariance =
+      model.by_delta * model.by_delta.transpose() + model.by_h * model.by_h.transpose();
   model.angle_root = root_of(covariance);
   const Eigen::VectorXd mean = by_delta2.rowwise().sum() + by_h2.rowwise().sum();
   const Eigen::VectorXd variance = 2 * by_delta2.rowwise().squaredNorm() +
@@ -111,43 +114,47 @@ void decide_on_angles(Model& model) {
       ((mean.cwiseAbs2() + variance).array() > kFelt * kFelt * covariance.diagonal().array()).any();
 }
 
-Model make_model(const PropagationInput& input) {
-  constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
-  const RunDescription& run = input.description;
-  const double gamma = run.gravity.local_mps2 / kStandardGravity_mps2;
-  Model model{input,
-              run.angles.delta_arcsec * kRadPerArcsec,
-              run.angles.h_arcsec * kRadPerArcsec,
-              run.gravity.u_mps2 / run.gravity.local_mps2,
-              {},
-              {},
-              {},
-              {},
-              false,
-              {}};
-  const auto n = std::ssize(input.poses);
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const PropagationAxis& axis = input.axis[i];
-    const Eigen::Vector3d K = axis.value.head<3>();
-    model.slope[i].resize(n, 5);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const Pose& pose = input.poses[static_cast<std::size_t>(k)];
-      const auto at = [&](double delta, double h) { return specific_force(delta, h, gamma); };
-      const SpecificForce force = at(pose.delta_deg, pose.h_deg);
-      // The second derivatives of sines and cosines are the functions 90° further on.
-      const SpecificForce lifted = at(pose.delta_deg, pose.h_deg + 90);
-      const SpecificForce both = at(pose.delta_deg + 90, pose.h_deg + 90);
-      Eigen::Vector3d delta2 = at(pose.delta_deg + 180, pose.h_deg).a_g;
-      delta2.z() = 0;
-      Eigen::Vector3d mixed = both.a_g;
-      mixed.z() = 0;
-      model.slope[i].row(k) << force.d_delta_g_per_rad.dot(K), force.d_h_g_per_rad.dot(K),
-          0.5 * delta2.dot(K), mixed.dot(K), 0.5 * lifted.d_h_g_per_rad.dot(K);
-    }
-    model.rounding_half_V[i] = (3 * axis.rounding_V2.array().max(0)).sqrt();
-    model.rounds[i] = model.rounding_half_V[i].maxCoeff() > 0;
-    model.noise_root[i] = root_of(axis.noise);
+/// Of the outputs of one axis, n × 5.
+Eigen::MatrixXd slopes(const std::vector<Pose>& poses, const Eigen::Vector3d& K, double gamma) {
+  Eigen::MatrixXd slope(std::ssize(poses), 5);
+  for (Eigen::Index k = 0; k < slope.rows(); ++k) {
+    const Pose& pose = poses[static_cast<std::size_t>(k)];
+    const auto at = [&](double delta, double h) { return specific_force(delta, h, gamma); };
+    const SpecificForce force = at(pose.delta_deg, pose.h_deg);
+    // The second derivatives of sines and cosines are the functions 90° further on.
+    const SpecificForce lifted = at(pose.delta_deg, pose.h_deg + 90);
+    const SpecificForce both = at(pose.delta_deg + 90, pose.h_deg + 90);
+    Eigen::Vector3d delta2 = at(pose.delta_deg + 180, pose.h_deg).a_g;
+    delta2.z() = 0;
+    Eigen::Vector3d mixed = both.a_g;
+    mixed.z() = 0;
+    slope.row(k) << force.d_delta_g_per_rad.dot(K), force.d_h_g_per_rad.dot(K), 0.5 * delta2.dot(K),
+        mixed.dot(K), 0.5 * lifted.d_h_g_per_rad.dot(K);
   }
+  return slope;
+}
+
+Model make_model(const PropagatedEstimate& estimate, const std::vector<Pose>& poses,
+                 const RunDescription& run) {
+  constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
+  const double gamma = run.gravity.local_mps2 / kStandardGravity_mps2;
+  Model model{.estimate = estimate,
+              .poses = std::ssize(poses),
+              .u_delta_rad = run.angles.delta_arcsec * kRadPerArcsec,
+              .u_h_rad = run.angles.h_arcsec * kRadPerArcsec,
+              .u_gamma = run.gravity.u_mps2 / run.gravity.local_mps2};
+  model.noise = estimate.covariance;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    model.slope[i] = slopes(poses, estimate.value[i].head<3>(), gamma);
+    const Eigen::VectorXd rounding_V2 = estimate.rounding_V2[i].cwiseMax(0);
+    model.rounding_half_V[i] = (3 * rounding_V2).cwiseSqrt();
+    model.rounds[i] = rounding_V2.maxCoeff() > 0;
+    const Eigen::VectorXd own_V2 = rounding_V2 +
+                                   (model.u_delta_rad * model.slope[i].col(0)).cwiseAbs2() +
+                                   (model.u_h_rad * model.slope[i].col(1)).cwiseAbs2();
+    model.noise -= estimate.gain[i] * own_V2.asDiagonal() * estimate.gain[i].transpose();
+  }
+  model.noise_root = root_of(model.noise);
   decide_on_angles(model);
   return model;
 }
@@ -155,60 +162,62 @@ Model make_model(const PropagationInput& input) {
 /// Deviations of the twelve parameters in `count` trials, 12 × count.
 Eigen::MatrixXd trials(const Model& model, std::uint64_t seed, std::size_t count) {
   Random random(seed);
-  const auto n = std::ssize(model.input.poses);
-  Eigen::MatrixXd result(kParameters, static_cast<Eigen::Index>(count));
-  Eigen::ArrayXd error_V(n), delta_rad = Eigen::ArrayXd::Zero(n), h_rad = delta_rad;
-  Eigen::VectorXd by_angles = Eigen::VectorXd::Zero(kParameters), draws = by_angles;
+  const Eigen::Index n = model.poses;
+  const auto columns = static_cast<Eigen::Index>(count);
   const bool turns = model.u_delta_rad > 0 || model.u_h_rad > 0;
-  for (Eigen::Index trial = 0; trial < result.cols(); ++trial) {
-    const double relative = model.u_gamma * random.normal();
-    if (turns && !model.bends) {
-      for (double& draw : draws) draw = random.normal();
-      by_angles = model.angle_root * draws;
-    }
+  Eigen::VectorXd relative(columns);
+  Eigen::MatrixXd normals(kParameters, columns), turned = normals;
+  Eigen::ArrayXd delta_rad(n), h_rad(n);
+  PerAxis<Eigen::MatrixXd> error_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (model.bends || model.rounds[i]) error_V[i] = Eigen::MatrixXd::Zero(n, columns);
+  for (Eigen::Index trial = 0; trial < columns; ++trial) {
+    relative(trial) = model.u_gamma * random.normal();
+    for (double& draw : normals.col(trial)) draw = random.normal();
+    if (turns && !model.bends)
+      for (double& draw : turned.col(trial)) draw = random.normal();
     for (Eigen::Index k = 0; model.bends && k < n; ++k) {
       delta_rad(k) = model.u_delta_rad * random.normal();
       h_rad(k) = model.u_h_rad * random.normal();
     }
     for (std::size_t i = 0; i < kAxisCount; ++i) {
-      const PropagationAxis& axis = model.input.axis[i];
-      Eigen::Vector4d normals;
-      for (Eigen::Index j = 0; j < 4; ++j) normals(j) = random.normal();
-      Eigen::Vector4d estimate = axis.value + model.noise_root[i] * normals +
-                                 by_angles.segment<4>(4 * static_cast<Eigen::Index>(i));
       const Eigen::MatrixXd& s = model.slope[i];
-      if (model.bends) {
-        error_V = delta_rad *
-                      (s.col(0).array() + s.col(2).array() * delta_rad + s.col(3).array() * h_rad) +
-                  h_rad * (s.col(1).array() + s.col(4).array() * h_rad);
-      } else {
-        error_V.setZero();
-      }
-      if (model.rounds[i]) {
-        for (Eigen::Index k = 0; k < n; ++k)
-          error_V(k) += model.rounding_half_V[i](k) * random.symmetric();
-      }
-      if (model.bends || model.rounds[i]) estimate += axis.gain.lazyProduct(error_V.matrix());
-      // The outputs came from g(1 + e), the design says g: the sensitivities come out too large.
-      estimate.head<3>() += relative * estimate.head<3>();
-      result.block<4, 1>(4 * static_cast<Eigen::Index>(i), trial) = estimate - axis.value;
+      if (model.bends)
+        error_V[i].col(trial) = delta_rad * (s.col(0).array() + s.col(2).array() * delta_rad +
+                                             s.col(3).array() * h_rad) +
+                                h_rad * (s.col(1).array() + s.col(4).array() * h_rad);
+      for (Eigen::Index k = 0; model.rounds[i] && k < n; ++k)
+        error_V[i](k, trial) += model.rounding_half_V[i](k) * random.symmetric();
     }
   }
-  return result;
+  Eigen::MatrixXd deviation = model.noise_root * normals;
+  if (turns && !model.bends) deviation += model.angle_root * turned;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (error_V[i].size() > 0) deviation += model.estimate.gain[i] * error_V[i];
+  // The outputs came from g(1 + e), the design says g: the sensitivities come out too large.
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    auto K = deviation.middleRows<3>(4 * static_cast<Eigen::Index>(i));
+    K += (K.colwise() + model.estimate.value[i].head<3>()) * relative.asDiagonal();
+  }
+  return deviation;
 }
 
-ParameterBudget budget_of(const Model& model, std::size_t i, Eigen::Index j) {
-  const PropagationAxis& axis = model.input.axis[i];
-  const Eigen::VectorXd square = axis.gain.row(j).cwiseAbs2().transpose();
+/// Of parameter p of the twelve.
+ParameterBudget budget_of(const Model& model, Eigen::Index p) {
   ParameterBudget budget;
-  budget.noise = std::sqrt(std::max(axis.noise(j, j), 0.0));
-  budget.positioning =
-      std::sqrt(square.dot((model.u_delta_rad * model.slope[i].col(0)).cwiseAbs2() +
-                           (model.u_h_rad * model.slope[i].col(1)).cwiseAbs2()));
-  budget.rounding = std::sqrt(square.dot(axis.rounding_V2.cwiseMax(0)));
-  budget.gravity = j < 3 ? std::abs(axis.value(j)) * model.u_gamma : 0;
-  budget.combined = std::hypot(std::hypot(budget.noise, budget.positioning),
-                               std::hypot(budget.rounding, budget.gravity));
+  budget.noise = std::sqrt(std::max(model.noise(p, p), 0.0));
+  budget.delta = model.by_delta.row(p).norm();
+  budget.h = model.by_h.row(p).norm();
+  double rounding = 0;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    rounding +=
+        model.estimate.gain[i].row(p).cwiseAbs2().dot(model.estimate.rounding_V2[i].cwiseMax(0));
+  budget.rounding = std::sqrt(rounding);
+  const double value = model.estimate.value[static_cast<std::size_t>(p / 4)](p % 4);
+  budget.gravity = p % 4 < 3 ? std::abs(value) * model.u_gamma : 0;
+  budget.combined = Eigen::Matrix<double, 5, 1>(budget.noise, budget.delta, budget.h,
+                                                budget.rounding, budget.gravity)
+                        .norm();
   return budget;
 }
 
@@ -266,13 +275,15 @@ bool is_stable(const std::vector<std::array<Summary, kParameters>>& blocks,
 
 }  // namespace
 
-UncertaintyReport propagate_uncertainty(const PropagationInput& input, std::uint64_t seed) {
-  const Model model = make_model(input);
+UncertaintyReport propagate_uncertainty(const PropagatedEstimate& estimate,
+                                        const std::vector<Pose>& poses,
+                                        const RunDescription& description, std::uint64_t seed) {
+  const Model model = make_model(estimate, poses, description);
   UncertaintyReport report;
   std::array<double, kParameters> tolerance{};
   for (std::size_t p = 0; p < kParameters; ++p) {
     ParameterUncertainty& parameter = report.parameter[p / 4][p % 4];
-    parameter.budget = budget_of(model, p / 4, static_cast<Eigen::Index>(p % 4));
+    parameter.budget = budget_of(model, static_cast<Eigen::Index>(p));
     parameter.tolerance = tolerance[p] = tolerance_of(parameter.budget.combined);
   }
 
@@ -297,7 +308,7 @@ UncertaintyReport propagate_uncertainty(const PropagationInput& input, std::uint
   report.validated = true;
   for (std::size_t p = 0; p < kParameters; ++p) {
     ParameterUncertainty& parameter = report.parameter[p / 4][p % 4];
-    const double value = input.axis[p / 4].value(static_cast<Eigen::Index>(p % 4));
+    const double value = estimate.value[p / 4](static_cast<Eigen::Index>(p % 4));
     std::vector<double> values = row_of(chunks, 0, chunks.size(), static_cast<Eigen::Index>(p));
     const Summary all = summary_of(values);
     const double expanded = kCoverage * parameter.budget.combined;

@@ -1,6 +1,6 @@
-// Uncertainty of the twelve parameters twice: by the law of propagation (GUM) and by propagating
-// the distributions themselves (GUM Supplement 1, JCGM 101:2008), with the comparison of its
-// clause 8.
+// Uncertainty of the twelve certified parameters twice: by the law of propagation (GUM) and by
+// propagating the distributions themselves (GUM Supplement 1, JCGM 101:2008), with the comparison
+// of its clause 8.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,24 +12,22 @@
 
 namespace plumbline {
 
-/// One axis as the propagation sees it; n poses. The estimator is linear: parameters = gain·y.
-struct PropagationAxis {
-  Eigen::Vector4d value;        ///< estimate [K_x K_y K_z U_0], V/g and V
-  Eigen::MatrixXd gain;         ///< 4 × n
-  Eigen::Matrix4d noise;        ///< covariance of the estimate by noise alone (type A)
-  Eigen::VectorXd rounding_V2;  ///< n, variance of the offset that rounding leaves in a pose mean
-};
-
-struct PropagationInput {
-  const std::vector<Pose>& poses;
-  const RunDescription& description;
-  const PerAxis<PropagationAxis>& axis;
+/// The certified estimate as the propagation sees it, linear in the means of n poses:
+/// [parameters of x, y, z] = Σ_i gain[i]·(means of axis i). Effects of the head that are estimated
+/// together with the twelve tie the axes.
+struct PropagatedEstimate {
+  PerAxis<Eigen::Vector4d> value;  ///< [K_x K_y K_z U_0], V/g and V
+  PerAxis<Eigen::MatrixXd> gain;   ///< 12 × n
+  /// 12 × 12, as the estimation states it: by noise, by rounding, and by positioning as if each
+  /// axis had a head of its own; gravity not included.
+  Eigen::MatrixXd covariance;
+  PerAxis<Eigen::VectorXd> rounding_V2;  ///< n, variance of the offset rounding leaves in a mean
 };
 
 /// Share of each source in one parameter, standard uncertainties in its unit (V/g or V).
 struct ParameterBudget {
   double noise = 0;
-  double positioning = 0;
+  double delta = 0, h = 0;  ///< the head's positioning
   double rounding = 0;
   double gravity = 0;
   double combined = 0;
@@ -53,10 +51,13 @@ struct UncertaintyReport {
   bool validated = false;   ///< all twelve
 };
 
-/// Distributions: noise normal with the covariance found; positioning normal in both angles of each
-/// pose, seen by all axes alike, through the true kinematics to second order; rounding rectangular;
-/// gravity normal. Trials come in blocks of 10⁴ until mean, u and both ends of every interval are
-/// stable to the tolerance. Deterministic in input and seed whatever the number of cores.
-UncertaintyReport propagate_uncertainty(const PropagationInput& input, std::uint64_t seed);
+/// Distributions: noise normal with what the covariance holds beside positioning and rounding;
+/// positioning normal in both angles of each pose, seen by all axes alike, through the true
+/// kinematics to second order; rounding rectangular; gravity normal. Trials come in blocks of 10⁴
+/// until mean, u and both ends of every interval are stable to the tolerance. Deterministic in
+/// input and seed whatever the number of cores.
+UncertaintyReport propagate_uncertainty(const PropagatedEstimate& estimate,
+                                        const std::vector<Pose>& poses,
+                                        const RunDescription& description, std::uint64_t seed);
 
 }  // namespace plumbline

@@ -278,14 +278,18 @@ TEST(Certificate, UkrainianForWhatTheCoreSays) {
                       "the past, times the component of the next axis, time constant 60 s)"),
             "поза переліком: temp_C змінює чутливість (пряма від середнього минулого, "
             "помножено на складову наступної осі, стала часу 60 s)");
-  EXPECT_EQ(uk.phrase("1 further pose in random order (h from 10° to 10°) tells it from "
+  EXPECT_EQ(uk.phrase("1 further pose in random order (h = 10°) tells it from "
                       "rig.backlash by 7.1 standard deviations"),
-            "ще одне положення у випадковому порядку (h від 10° до 10°) відрізнить його від "
+            "ще одне положення у випадковому порядку (h = 10°) відрізнить його від "
             "rig.backlash на 7.1 стандартних відхилень");
   EXPECT_EQ(uk.phrase("3 further poses in random order (h from 10° to 40°) tell it from "
                       "rig.backlash by 7.1 standard deviations"),
             "подальші положення у випадковому порядку (кількість 3, h від 10° до 40°) відрізнять "
             "його від rig.backlash на 7.1 стандартних відхилень");
+  EXPECT_EQ(uk.phrase("2 further poses in random order (h = 10°) tell it from rig.backlash by 7.1 "
+                      "standard deviations"),
+            "подальші положення у випадковому порядку (кількість 2, h = 10°) відрізнять його від "
+            "rig.backlash на 7.1 стандартних відхилень");
 }
 
 TEST(Certificate, UkrainianForEveryShapeWithoutAName) {

@@ -32,9 +32,17 @@ verification_poses = 4
 wait_s = 2
 )";
 
+/// Whoever stops a run needs one that is not over before.
+constexpr const char* kLongPlan = R"(
+[plan]
+soak_s = 5
+samples_per_pose = 20
+verification_poses = 4
+)";
+
 class NightProgram : public testing::Test {
  protected:
-  void start_rig(const std::string& faults = "") {
+  void start_rig(const std::string& faults = "", const std::string& plan = kPlan) {
     const fs::path world = fs::path(PLUMBLINE_SOURCE_DIR) / "rig/sim/worlds/white.toml";
     auto simulated =
         SimulatedRig::start({.world_toml = text_of(world) + faults, .speed = 40, .seed = 3});
@@ -47,7 +55,7 @@ class NightProgram : public testing::Test {
                    "identity_address = 0x200\nidentity_count = 4\n"
                    "soft_limits = { delta_deg = [-369, 369], h_deg = [-94, 94] }\n"
                    "[sensor]\ncan = \"" +
-                   rig_->can() + "\"\nidentity = \"IDENT.Serial\"\n" + kPlan);
+                   rig_->can() + "\"\nidentity = \"IDENT.Serial\"\n" + plan);
   }
   std::string config() const { return folder_ / "rig.toml"; }
   std::string hooks() const { return folder_ / "hooks"; }
@@ -98,7 +106,7 @@ set = { )" +
 };
 
 TEST_F(NightProgram, CtlPausesResumesShowsAndStops) {
-  start_rig();
+  start_rig("", kLongPlan);
   EXPECT_EQ(ctl({"status"}).exit_code, 2) << "nobody is there";
   const std::string summary = folder_ / "exit.json";
   ProgramOutcome ended;

@@ -62,5 +62,27 @@ TEST(RestoredModel, LeavesOutWhatNeedsAColumnThatIsNotThere) {
   EXPECT_EQ(with.parameters.effects.size(), 1u);
 }
 
+// Effects that exist only for the columns of a set are not there to be asked what they need.
+TEST(RestoredModel, NamesTheColumnsOfACalibrationThatASetLacks) {
+  CertifiedModel model;
+  model.history.covariate_names = {"rh_pct", "supply_V"};
+  FoundEffect supply;
+  supply.id = "covariate:supply_V";
+  supply.axes = {1};
+  supply.parameters = {{"c", std::size_t{1}, 0.001, 1e-5, "g/unit"},
+                       {"mean", std::size_t{1}, 5, 0, "unit"}};
+  model.effects = {supply};
+  UnlistedStructure humid, time;
+  humid.driver = "rh_pct.rate";
+  time.driver = "t_s";
+  model.unlisted = {humid, time};
+  VisitLog log;
+  log.visits.resize(2);
+  const RestoredModel without = restore_model(model, log);
+  EXPECT_THAT(without.left_out,
+              testing::ElementsAre("covariate:supply_V", "unlisted: rh_pct.rate", "unlisted: t_s"));
+  EXPECT_THAT(without.lacking, testing::ElementsAre("supply_V", "rh_pct"));
+}
+
 }  // namespace
 }  // namespace plumbline

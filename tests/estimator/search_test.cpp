@@ -56,6 +56,19 @@ TEST(Search, DriftsBesideATiltedBaseAreNoTiltThatFollowsTheTime) {
   EXPECT_THAT(result.diagnosis.effects,
               UnorderedElementsAre(Field(&FoundEffect::id, "rig.base_roll"),
                                    Field(&FoundEffect::id, "sensor.drift")));
+  // What the Monte Carlo method compares is the certified estimate: with the effects, which tie the
+  // axes and cost some of their certainty.
+  ASSERT_TRUE(result.uncertainty);
+  EXPECT_TRUE(result.uncertainty->validated);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    for (Eigen::Index j = 0; j < 4; ++j) {
+      const ParameterUncertainty& p = result.uncertainty->parameter[i][static_cast<std::size_t>(j)];
+      const double u = std::sqrt(result.final.batch_ls[i].covariance(j, j));
+      EXPECT_NEAR(p.mc_mean, result.final.batch_ls[i].value(j), 0.05 * u);
+      EXPECT_NEAR(p.budget.combined, u, 0.02 * u);
+      EXPECT_NEAR(p.mc_u, u, 0.03 * u);
+    }
+  }
 }
 
 // A polynomial of h holds the sine of h, but for the last digits: the sensitivity to z came out
