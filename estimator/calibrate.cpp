@@ -256,6 +256,15 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   return work;
 }
 
+/// With smooth ones where the record of any axis shows them: one triad, one kind of noise.
+NoiseProcesses processes_of(const std::vector<SampleWindow>& windows,
+                            const PerAxis<NoiseModel>& noise) {
+  const NoiseProcesses smooth = noise_processes(windows, true);
+  for (const NoiseModel& model : noise)
+    if (NoisePool(smooth, model, {}).record_shows_smooth_noise()) return smooth;
+  return noise_processes(windows);
+}
+
 /// Filter, recursive and batch estimates after each pose; the last ones are those of the run.
 void follow_convergence(const Experiment& experiment, const AxisWork& work, double inflation,
                         std::size_t axis, Convergence& convergence) {
@@ -364,7 +373,6 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
 
   experiment.windows =
       pose_windows(input.run.samples, input.run.poses, static_step_s(input.static_record));
-  experiment.processes = noise_processes(experiment.windows);
   experiment.drivers = driver_means(input.run.samples, input.run.poses);
   const std::size_t n = experiment.poses.size();
   result.convergence.rls.resize(n);
@@ -387,9 +395,10 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
       experiment.noisier_V2[driver.axis] += driver.excess_V2;
   }
 
+  parallel_for(kAxisCount, [&](std::size_t axis) { result.noise[axis] = identify(input, axis); });
+  experiment.processes = processes_of(experiment.windows, result.noise);
   PerAxis<AxisWork> work;
   parallel_for(kAxisCount, [&](std::size_t axis) {
-    result.noise[axis] = identify(input, axis);
     work[axis] = fit_axis(experiment, result.noise[axis], axis);
   });
   VerdictInput verdict;

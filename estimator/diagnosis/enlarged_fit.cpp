@@ -18,15 +18,11 @@ bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, s
   return active.free[k] && info.role == ParameterRole::shape && !info.place;
 }
 
-// Time constants, widths and the like keep their sign, and sensitivities about their size: no
-// effect takes their place.
+constexpr double kLargestChange = 3, kLikelyChange = 2;  // of a sensitivity, as ratios
+
+// Time constants, widths and the like keep their sign, and sensitivities about their size.
 bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
-  constexpr double kLargestChange = 3;  // as a ratio
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const auto own = static_cast<Eigen::Index>(i);
-    const double ratio = trial.twelve[i](own) / start.twelve[i](own);
-    if (!(ratio > 1 / kLargestChange && ratio < kLargestChange)) return false;
-  }
+  if (!keeps_sensitivities(trial, start, kLargestChange)) return false;
   for (std::size_t e = 0; e < trial.effects.size(); ++e) {
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
@@ -113,6 +109,16 @@ bool cancel_each_other(const EnlargedFit& fit) {
 }
 
 }  // namespace
+
+bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
+                         double most) {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto own = static_cast<Eigen::Index>(i);
+    const double ratio = parameters.twelve[i](own) / start.twelve[i](own);
+    if (!(ratio > 1 / most && ratio < most)) return false;
+  }
+  return true;
+}
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
   lower[axis] = Eigen::LLT<Eigen::MatrixXd>(covariance_V2).matrixL();
@@ -218,7 +224,8 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     if (!improved) fit.converged = true;  // no direction leads down any more
   }
   fit.covariance = covariance_of(fit.whitened_jacobian.topRows(rows));
-  fit.determined = !cancel_each_other(fit) && !leave_a_sensitivity_open(fit);
+  fit.determined = keeps_sensitivities(fit.parameters, start, kLikelyChange) &&
+                   !cancel_each_other(fit) && !leave_a_sensitivity_open(fit);
   return fit;
 }
 

@@ -31,9 +31,14 @@ struct EnlargedFit : EnlargedEstimate {
   double chi2 = 0;
   bool converged = false;
   /// No direction of the free parameters is unobservable, the effects are no large differences of
-  /// each other, and they leave no sensitivity open.
+  /// each other, and they neither leave a sensitivity open nor take its place.
   bool determined = true;
 };
+
+/// Whether the sensitivity of each axis to its own direction is within a ratio of `most` of what it
+/// was. Where it is not, effects have taken its place.
+bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
+                         double most);
 
 /// Of a fit that is to settle.
 inline constexpr int kMostIterations = 20;

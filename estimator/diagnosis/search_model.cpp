@@ -206,7 +206,11 @@ bool SearchModel::adopt(const EnlargedParameters& parameters) {
     held.effects.back() = with_shapes_held(std::move(held.effects.back()));
     next = settle(input_, held, before);
   }
-  if (!next.fit.determined) return false;
+  // Fit by fit a sensitivity may go far.
+  constexpr double kLargestChange = 3;  // as a ratio
+  if (!next.fit.determined ||
+      !keeps_sensitivities(next.fit.parameters, input_.start, kLargestChange))
+    return false;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (before.known[axis] != nullptr) next.crossing_V2[axis] = std::move(stage_.crossing_V2[axis]);
   stage_ = std::move(next);

@@ -57,6 +57,23 @@ Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double de
   return covariance;
 }
 
+Eigen::MatrixXd smooth_walk(const std::vector<SampleWindow>& windows, double bend_rad_per_s) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  const double variance = 1 / (2 * std::numbers::sqrt2 * std::pow(bend_rad_per_s, 3));
+  const double rate_per_s = bend_rad_per_s / std::numbers::sqrt2;
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    covariance(i, i) = variance;
+    const double from_s = middle_s(windows[static_cast<std::size_t>(i)]);
+    for (Eigen::Index j = i + 1; j < n; ++j) {
+      const double x = rate_per_s * (middle_s(windows[static_cast<std::size_t>(j)]) - from_s);
+      covariance(i, j) = variance * std::exp(-x) * (std::cos(x) + std::sin(x));
+      covariance(j, i) = covariance(i, j);
+    }
+  }
+  return covariance;
+}
+
 std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses,
                                        double single_step_s) {
   std::vector<SampleWindow> windows;

@@ -42,6 +42,11 @@ std::array<Eigen::MatrixXd, kTermCount> unit_covariances(const std::vector<Sampl
 /// and the given inverse correlation time.
 Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double decay_per_s);
 
+/// The same of the second-order process v̇₁ = v₂, v̇₂ = −√2ω₀v₂ − ω₀²v₁ + u with unit driving
+/// density, ω₀ = bend_rad_per_s: 1/(2√2ω₀³)·e^(−bτ)(cos bτ + sin bτ), b = ω₀/√2. It hardly
+/// changes within a window, and is taken in the middle of each.
+Eigen::MatrixXd smooth_walk(const std::vector<SampleWindow>& windows, double bend_rad_per_s);
+
 /// Covariance of the window means under all identified terms, U², positive definite when white
 /// noise or rounding is present.
 Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<SampleWindow>& windows);

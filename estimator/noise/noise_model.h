@@ -99,11 +99,12 @@ inline void add_remark(std::string& remark, std::string_view more) {
 /// them is all that a record says about the noise powers: its likelihood can be pooled with other
 /// data.
 struct SpectrumBin {
-  double count = 0;   ///< coefficients c in the bin
-  double square = 0;  ///< Σc², U²
-  double cross = 0;   ///< Σc·m, m the coefficient of a ramp of 1 U/s
-  double ramp = 0;    ///< Σm²
-  double known = 0;   ///< variance of a coefficient beyond the powers that are asked for, U²
+  double frequency_hz = 0;  ///< in the middle
+  double count = 0;         ///< coefficients c in the bin
+  double square = 0;        ///< Σc², U²
+  double cross = 0;         ///< Σc·m, m the coefficient of a ramp of 1 U/s
+  double ramp = 0;          ///< Σm²
+  double known = 0;         ///< variance of a coefficient beyond the powers that are asked for, U²
   /// Mean variance of a coefficient for Q², N², B², K² = 1.
   Eigen::Vector4d density = Eigen::Vector4d::Zero();
 };

@@ -13,16 +13,21 @@ namespace plumbline {
 /// The independent processes that the noise of a run is taken to consist of: quantization, white,
 /// flicker and random walk of IEEE Std 952, then first-order Gauss-Markov processes (unit driving
 /// density) whose correlation times go from a dwell to the whole run in equal ratios. What is seen
-/// of real flicker, of several relaxations or of walks that level off, is a sum of these.
+/// of real flicker, of several relaxations or of walks that level off, is a sum of these. Last, if
+/// asked for, the ramp of Kostyuk & Lakoza (2012, eq. 6), a second-order process smoother than any
+/// of them, with bends about the frequency of one turn in a run. What is smooth may as well be an
+/// effect: it is asked for where a static record shows it.
 struct NoiseProcesses {
   static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
   static constexpr Eigen::Index kFirstSlow = kTermB;
   static constexpr double kMarkovRatio = 4;  ///< of neighbouring correlation times
   std::vector<double> decay_per_s;           ///< of the Gauss-Markov processes, slowest first
+  std::vector<double> bend_rad_per_s;        ///< of the smooth processes, slowest first
   std::vector<Eigen::MatrixXd> unit;         ///< covariance of the window means, power 1
   std::vector<bool> is_diagonal;             ///< of each: without memory between windows
 
   Eigen::Index count() const { return std::ssize(unit); }
+  Eigen::Index first_smooth() const { return kFirstMarkov + std::ssize(decay_per_s); }
   /// Those that change over the run rather than from visit to visit.
   std::vector<Eigen::Index> walks() const;
   /// Mean variance about the mean of the run that a power of 1 of one of them makes.
@@ -31,6 +36,6 @@ struct NoiseProcesses {
     return covariance.diagonal().mean() - covariance.mean();
   }
 };
-NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows);
+NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows, bool smooth = false);
 
 }  // namespace plumbline

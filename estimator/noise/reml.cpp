@@ -122,19 +122,40 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
           std::min(level * same_rate, density(0, bin)(kTermK));  // no process exceeds the walk
     }
   }
+  for (std::size_t r = 0; r < processes.bend_rad_per_s.size(); ++r) {
+    const double bend4 = square(square(processes.bend_rad_per_s[r]));
+    for (Eigen::Index bin = 0; bin < bins; ++bin) {
+      const SpectrumBin& of_walk = descriptions.front().bins[static_cast<std::size_t>(bin)];
+      const double omega2 = square(2 * std::numbers::pi * of_walk.frequency_hz);
+      densities(bin, processes.first_smooth() + static_cast<Eigen::Index>(r)) =
+          of_walk.density(kTermK) * omega2 / (square(omega2) + bend4);
+    }
+  }
   record_.own.resize(bins);
   for (Eigen::Index bin = 0; bin < bins; ++bin)
     record_.own(bin) = descriptions.front().bins[static_cast<std::size_t>(bin)].known;
   record_apart_ = apart();
 }
 
-NoisePool::Climb NoisePool::climb_of_record() const {
-  return climb(starting_powers(), free_powers(),
+NoisePool::Climb NoisePool::climb_of_record(bool smooth) const {
+  Eigen::VectorXd first = starting_powers();
+  std::vector<bool> free = free_powers();
+  for (Eigen::Index i = processes_->first_smooth(); !smooth && i < processes_->count(); ++i) {
+    first(i) = 0;
+    free[static_cast<std::size_t>(i)] = false;
+  }
+  return climb(first, free,
                [this](const Eigen::VectorXd& power) { return record_at(power, record_); });
 }
 
+bool NoisePool::record_shows_smooth_noise() const {
+  constexpr double kClearly = 8;  // of −2 ln L
+  return record_.shared.size() > 0 &&
+         climb_of_record(true).top.deviance < climb_of_record(false).top.deviance - kClearly;
+}
+
 NoisePool::Record NoisePool::apart() const {
-  const Eigen::VectorXd power = climb_of_record().top.power;
+  const Eigen::VectorXd power = climb_of_record(true).top.power;
   Record apart = record_;
   apart.price = kPriceOfApart;
   for (const Eigen::Index i : processes_->walks()) {
@@ -390,7 +411,7 @@ std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
                                                       const Eigen::VectorXd& mean,
                                                       const Eigen::MatrixXd& design) const {
   if (record_.shared.size() == 0) return std::nullopt;
-  const Climb of_record = climb_of_record();
+  const Climb of_record = climb_of_record(true);
   const PooledNoise of_run =
       NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);
   return Contradiction{both.deviance - of_record.top.deviance - of_run.deviance,
@@ -448,6 +469,8 @@ NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
                   (2 * processes.decay_per_s[m]);
   const auto strongest = std::max_element(variance.begin(), variance.end());
   double walk = pooled.power(kTermK);
+  for (Eigen::Index i = processes.first_smooth(); i < processes.count(); ++i)
+    walk += pooled.power(i) * processes.variance_over_run(i) / processes.variance_over_run(kTermK);
   model.walk_decay_per_s = 0;
   if (strongest != variance.end() && *strongest > walk * span_s / 3) {
     const auto m = static_cast<std::size_t>(strongest - variance.begin());

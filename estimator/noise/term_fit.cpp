@@ -22,7 +22,12 @@ std::vector<Bin> make_bins(const SpectrumSums& sums, double decay_per_s) {
   std::vector<Bin> bins;
   bins.reserve(sums.bins.size());
   for (const SpectrumSum& sum : sums.bins) {
-    Bin bin{.count = sum.count, .square = sum.square, .cross = sum.cross, .ramp = sum.ramp};
+    const double middle = static_cast<double>(sum.first) + 0.5 * static_cast<double>(sum.width - 1);
+    Bin bin{.frequency_hz = sums.frequency_hz(middle),
+            .count = sum.count,
+            .square = sum.square,
+            .cross = sum.cross,
+            .ramp = sum.ramp};
     bin.density = {
         bin_mean(sum, [&](double k) { return quantization_variance(k, n, rate_hz); }), rate_hz,
         bin_mean(sum,
