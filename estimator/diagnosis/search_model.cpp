@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
+#include "estimator/fit/rounding.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
 
@@ -166,10 +168,20 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
   // The axes round independently of each other: Fisher's sum of their log-probabilities.
   const Eigen::Index n = std::ssize(input_.log.visits);
   double sum = 0;
-  for (Eigen::Index row = 0; row < mean_rows(input_.log); row += n) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const Eigen::Index row = static_cast<Eigen::Index>(axis) * n;
     const double of_axis = before.whitened_residual.segment(row, n).squaredNorm() -
                            with.whitened_residual.segment(row, n).squaredNorm();
-    if (of_axis > 0) sum -= 2 * std::log(f_tail(of_axis, 1, kDofOfCoarseReadings));
+    if (!(of_axis > 0)) continue;
+    // Rounding makes single means stray, but no further than it moves any: once to one side, where
+    // it is undone to the other.
+    const double moved_V = (with_V[axis] - before_V[axis]).lpNorm<Eigen::Infinity>();
+    const double strays_V =
+        2 * largest_rounding_bias_V(input_.log.step_V(axis), input_.log.input_sd_V[axis]);
+    const double beyond = std::sqrt(of_axis) * std::max(0.0, 1 - strays_V / moved_V);
+    const double p =
+        std::min(f_tail(of_axis, 1, kDofOfCoarseReadings), normal_two_sided_tail(beyond));
+    sum -= 2 * std::log(std::max(p, std::numeric_limits<double>::min()));
   }
   return log_chi_squared_tail(sum, 2.0 * kAxisCount);
 }

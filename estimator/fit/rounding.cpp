@@ -89,15 +89,6 @@ std::vector<CodeCounts> counts_of_means(const Eigen::VectorXd& mean, double samp
   return all;
 }
 
-/// The most that rounding takes from or adds to a mean of readings with noise `sigma_V`.
-double largest_bias_V(double step_V, double sigma_V) {
-  constexpr int kPlaces = 32;
-  double largest_V = 0;
-  for (int k = 0; k < kPlaces; ++k)
-    largest_V = std::max(largest_V, rounding_bias(step_V * k / kPlaces, 0, step_V, sigma_V).bias);
-  return largest_V;
-}
-
 /// Of a step: with more noise 6e-5 of it are left of rounding to it.
 constexpr double kNoTrace = 0.7;
 /// Of a step: less noise leaves the staircase its edges; a mean says in which step the voltage lies
@@ -121,6 +112,14 @@ CodeSites within_edges(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& exp
 
 double sd_before_rounding_V(double step_V, double recorded_V) {
   return std::sqrt(noise_before_rounding_V2(step_V, recorded_V * recorded_V));
+}
+
+double largest_rounding_bias_V(double step_V, double sigma_V) {
+  constexpr int kPlaces = 32;
+  double largest_V = 0;
+  for (int k = 0; k < kPlaces; ++k)
+    largest_V = std::max(largest_V, rounding_bias(step_V * k / kPlaces, 0, step_V, sigma_V).bias);
+  return largest_V;
 }
 
 bool is_coarse_against(double step_V, double sample_sd_V) {
@@ -181,7 +180,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
       step_V * sigma_at((expected_V.array() - origin_V) / step_V, recorded_V2 / (step_V * step_V),
                         sigma_V / step_V, std::sqrt(slow_V2) / step_V);
   white_V2 = sigma_V * sigma_V;
-  const double most_V = largest_bias_V(step_V, sigma_V);
+  const double most_V = largest_rounding_bias_V(step_V, sigma_V);
   for (int round = 0; round < 4; ++round) {
     // On the flats of the staircase undoing it to first order blows up what is not of first order.
     // Half the slope at least was worse: readings that are all alike passed for sure knowledge.

@@ -16,6 +16,10 @@ double sd_before_rounding_V(double step_V, double recorded_V);
 /// Whether noise of `sample_sd_V`, as recorded, is too small to average rounding to `step_V` away.
 bool is_coarse_against(double step_V, double sample_sd_V);
 
+/// The most that rounding to `step_V` takes from or adds to a mean of readings that scattered by
+/// `sigma_V` before.
+double largest_rounding_bias_V(double step_V, double sigma_V);
+
 /// Readings of one axis with rounding, as a model sees it.
 struct RoundingFree {
   Eigen::VectorXd mean_V;       ///< what the means would have been without rounding

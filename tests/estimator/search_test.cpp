@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <random>
+#include <vector>
 
 #include "estimator/calibrate.h"
 #include "tests/estimator/synthetic_run.h"
@@ -41,6 +44,74 @@ TEST(Search, ThreeCubicsAreNoErrorOfTheHead) {
   ASSERT_THAT(result.diagnosis.effects, SizeIs(1));
   EXPECT_EQ(result.diagnosis.effects.front().id, "sensor.cubic");
   EXPECT_THAT(result.diagnosis.effects.front().axes, SizeIs(3));
+}
+
+/// A course of the second-order process of Kostyuk & Lakoza's ramp (2012, eq. 6) with variance 1,
+/// as a sum of waves with its density.
+std::function<double(double)> smooth_noise(double bend_rad_per_s, std::mt19937_64& random) {
+  constexpr int kWaves = 200;
+  constexpr double kHighest = 6;  // of the bend; the density falls with the fourth power
+  std::normal_distribution<double> normal;
+  std::vector<std::array<double, 3>> waves;  // frequency, rad/s, and amplitudes
+  double variance = 0;
+  for (int k = 0; k < kWaves; ++k) {
+    const double x = kHighest * (k + 0.5) / kWaves, density = 1 / (1 + std::pow(x, 4));
+    waves.push_back({x * bend_rad_per_s, std::sqrt(density) * normal(random),
+                     std::sqrt(density) * normal(random)});
+    variance += density;
+  }
+  return [waves, scale = 1 / std::sqrt(variance)](double t_s) {
+    double sum = 0;
+    for (const auto& [omega, c, s] : waves)
+      sum += c * std::cos(omega * t_s) + s * std::sin(omega * t_s);
+    return scale * sum;
+  };
+}
+
+// Smoother than any walk, and as large in the record: of such noise a third of the runs was a wave,
+// a bell or a polynomial of the time.
+TEST(Search, SmoothNoiseThatTheRecordShowsIsNoEffect) {
+  SyntheticOptions options;
+  constexpr double kRun_s = 180;
+  options.still_s = 1.4 * kRun_s;
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    std::mt19937_64 random(seed);
+    for (auto& more_V : options.more_V)
+      more_V = [noise = smooth_noise(2 * std::numbers::pi * 1.5 / kRun_s, random)](
+                   const auto&, double t_s) { return 3e-4 * noise(t_s); };
+    const Calibration result = calibrated(synthetic_run(seed, kSixteenBits, options));
+    EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << seed << ": " << result.diagnosis.reason;
+  }
+}
+
+// With noise of a third of a step and more, rounding hardly moves a mean.
+TEST(Search, APoseThatIsOffIsFoundInReadingsOfACoarseConverter) {
+  SyntheticOptions options = full_grid();
+  options.samples_per_pose = 40;
+  options.sigma_V = 0.4 * kTwelveBits.lsb_V();
+  options.delta_error_deg = [](double delta_deg, double h_deg) {
+    return delta_deg == 60 && h_deg == 20 ? 1.3 : 0;
+  };
+  const Calibration result = calibrated(synthetic_run(7, kTwelveBits, options));
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  EXPECT_THAT(result.diagnosis.effects,
+              UnorderedElementsAre(Field(&FoundEffect::id, "rig.pose_outlier")));
+}
+
+// A polynomial of a component holds its cube, and both together the component itself: fit by fit
+// the sensitivity came out six orders of magnitude too large, and the error as much too small.
+TEST(Search, AFifthPowerIsNoCubeBesideAPolynomial) {
+  SyntheticOptions options = full_grid();
+  options.samples_per_pose = 40;
+  options.more_V[1] = [](const auto& a_g, double) { return 1.2e-3 * std::pow(a_g[1], 5); };
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "a_y");
+  EXPECT_NEAR(result.final.batch_ls[1].value(1) / data.truth[1][1], 1, 0.05);
 }
 
 // What varies while the base is tilted is not the tilt.

@@ -22,6 +22,7 @@ struct SyntheticOptions {
   std::size_t samples_per_pose = 20;
   bool varied_dwells = false;  ///< every second pose has half as many
   bool random_order = false;
+  double still_s = 60;  ///< length of the record
   int delta_step_deg = 30;
   int h_step_deg = 20;
   double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
@@ -39,7 +40,7 @@ struct SyntheticRun {
   PerAxis<std::array<double, 4>> truth;  ///< [K_ix K_iy K_iz U_i0]
   RunDescription description;
   MeasurementSet run;
-  SampleTable still;  ///< 60 s at δ = h = 0
+  SampleTable still;  ///< before the run, at δ = h = 0
 };
 
 inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
@@ -58,7 +59,7 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
   result.description.adc = adc;
   const double gamma = 9.8101 / kStandardGravity_mps2;
 
-  bool moving = false;  // the record of 60 s is at rest
+  bool moving = false;  // the record is at rest
   double arrival_s = 0;
   const auto add_sample = [&](SampleTable& table, double t_s, double to_delta_deg,
                               double to_h_deg) {
@@ -86,13 +87,14 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
                                 adc.lsb_V() * std::round((u_V - adc.min_V) / adc.lsb_V()));
     }
   };
-  for (int i = 0; i < 6000; ++i) add_sample(result.still, i / kRate_hz, 0, 0);
+  const auto still = static_cast<int>(options.still_s * kRate_hz);
+  for (int i = 0; i < still; ++i) add_sample(result.still, i / kRate_hz, 0, 0);
   std::vector<std::pair<int, int>> positions;
   for (int h = 0; h <= 80; h += options.h_step_deg)
     for (int delta = 0; delta < 360; delta += options.delta_step_deg)
       positions.emplace_back(delta, h);
   if (options.random_order) std::shuffle(positions.begin(), positions.end(), random);
-  double t_s = 61;
+  double t_s = options.still_s + 1;
   for (const auto& [delta, h] : positions) {
     const std::size_t half = options.varied_dwells ? 1 + result.run.poses.size() % 2 : 1;
     const std::size_t count = options.samples_per_pose / half;
