@@ -53,5 +53,28 @@ TEST(EnlargedFit, IsNotDeterminedWhereEffectsAreLargeDifferencesOfEachOther) {
   EXPECT_FALSE(fit.determined);
 }
 
+// A fifth power that was a cube and a polynomial at once made a sensitivity of its axis that grew
+// fit by fit, to five million times what it was.
+TEST(EnlargedFit, IsNotDeterminedWhereASensitivityIsFarFromWhatItWas) {
+  const SyntheticRun data = synthetic_run(3, kSixteenBits);
+  const VisitLog log = make_visit_log(data.run, data.description);
+  const Observations observed = observe(data.run, log);
+  const Eigen::Index n = observed.mean_V[0].size();
+  PoseWhitening whitening;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    whitening.set(i, 1e-8 * Eigen::MatrixXd::Identity(n, n));
+    whitening.dwell_sd_V[i] = Eigen::VectorXd::Ones(log.dwell_contrasts());
+  }
+  const auto fit_from = [&](double share_of_K_yy) {
+    EnlargedParameters start;
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      start.twelve[i] = Eigen::Map<const Eigen::Vector4d>(data.truth[i].data());
+    start.twelve[1](1) *= share_of_K_yy;
+    return fit_enlarged(log, observed, whitening, start);
+  };
+  EXPECT_TRUE(fit_from(0.8).determined);
+  EXPECT_FALSE(fit_from(0.4).determined);
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -99,8 +99,7 @@ TEST(Search, APoseThatIsOffIsFoundInReadingsOfACoarseConverter) {
               UnorderedElementsAre(Field(&FoundEffect::id, "rig.pose_outlier")));
 }
 
-// A polynomial of a component holds its cube, and both together the component itself: fit by fit
-// the sensitivity came out six orders of magnitude too large, and the error as much too small.
+// A polynomial of a component holds its cube, and both together nearly the component itself.
 TEST(Search, AFifthPowerIsNoCubeBesideAPolynomial) {
   SyntheticOptions options = full_grid();
   options.samples_per_pose = 40;
