@@ -256,15 +256,6 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   return work;
 }
 
-/// With smooth ones where the record of any axis shows them: one triad, one kind of noise.
-NoiseProcesses processes_of(const std::vector<SampleWindow>& windows,
-                            const PerAxis<NoiseModel>& noise) {
-  const NoiseProcesses smooth = noise_processes(windows, true);
-  for (const NoiseModel& model : noise)
-    if (NoisePool(smooth, model, {}).record_shows_smooth_noise()) return smooth;
-  return noise_processes(windows);
-}
-
 /// Filter, recursive and batch estimates after each pose; the last ones are those of the run.
 void follow_convergence(const Experiment& experiment, const AxisWork& work, double inflation,
                         std::size_t axis, Convergence& convergence) {
@@ -353,10 +344,26 @@ PropagatedEstimate propagated(const PerAxis<AxisWork>& work, const PerAxis<doubl
   return estimate;
 }
 
-}  // namespace
+/// Whether a reading is said to follow the time in a way that has no name.
+bool follows_the_time(const Diagnosis& diagnosis) {
+  return std::any_of(
+      diagnosis.unlisted.begin(), diagnosis.unlisted.end(), [](const UnlistedStructure& found) {
+        return found.driver == "t_s" && (found.form == "bias" || found.form == "scale");
+      });
+}
 
-Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& options) {
-  assert(given.run.has_angles && !given.run.poses.empty());
+/// Whether the record of any axis shows noise that is smoother than a walk: one triad, one kind.
+bool records_show_smooth_noise(const CalibrationInput& input, const PerAxis<NoiseModel>& noise) {
+  const NoiseProcesses processes = noise_processes(
+      pose_windows(input.run.samples, input.run.poses, static_step_s(input.static_record)), true);
+  return std::any_of(noise.begin(), noise.end(), [&](const NoiseModel& model) {
+    return NoisePool(processes, model, {}).record_shows_smooth_noise();
+  });
+}
+
+/// With or without smooth noise.
+Calibration calibrate_with(const CalibrationInput& given, const CalibrationOptions& options,
+                           bool smooth) {
   RunDescription description = given.description;
   if (description.adc) description.adc = aligned_with(given.run.samples, *description.adc);
   const CalibrationInput input{given.run, given.static_record, description};
@@ -396,7 +403,7 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   }
 
   parallel_for(kAxisCount, [&](std::size_t axis) { result.noise[axis] = identify(input, axis); });
-  experiment.processes = processes_of(experiment.windows, result.noise);
+  experiment.processes = noise_processes(experiment.windows, smooth);
   PerAxis<AxisWork> work;
   parallel_for(kAxisCount, [&](std::size_t axis) {
     work[axis] = fit_axis(experiment, result.noise[axis], axis);
@@ -490,6 +497,18 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   if (input.description.limits && worst_error_mps2 >= 0)
     result.decision =
         decide(input.description.limits->max_abs_error_mps2, worst_error_mps2, u_worst_mps2);
+  return result;
+}
+
+}  // namespace
+
+Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& options) {
+  assert(given.run.has_angles && !given.run.poses.empty());
+  Calibration result = calibrate_with(given, options, false);
+  // Decided again only then: what follows a column does so while the record is taken, too, and
+  // would hide in noise as smooth as that.
+  if (follows_the_time(result.diagnosis) && records_show_smooth_noise(given, result.noise))
+    result = calibrate_with(given, options, true);
   return result;
 }
 
