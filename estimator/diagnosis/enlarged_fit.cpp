@@ -20,9 +20,24 @@ bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, s
 
 constexpr double kLargestChange = 3, kLikelyChange = 2;  // of a sensitivity, as ratios
 
+bool are_about_the_size(const EnlargedParameters& parameters, const EnlargedParameters& start,
+                        double most) {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto own = static_cast<Eigen::Index>(i);
+    const double ratio = parameters.twelve[i](own) / start.twelve[i](own);
+    if (!(ratio > 1 / most && ratio < most)) return false;
+  }
+  return true;
+}
+
+bool remembers(const EnlargedParameters& parameters) {
+  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
+                     [](const ActiveEffect& active) { return active.effect->remembers(); });
+}
+
 // Time constants, widths and the like keep their sign, and sensitivities about their size.
 bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
-  if (!keeps_sensitivities(trial, start, kLargestChange)) return false;
+  if (!are_about_the_size(trial, start, kLargestChange)) return false;
   for (std::size_t e = 0; e < trial.effects.size(); ++e) {
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
@@ -64,10 +79,7 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& whitened_jacobian) {
 /// a response that is creep for the most part little is known at rest; that is no fault of a fit.
 bool leave_a_sensitivity_open(const EnlargedFit& fit) {
   constexpr double kUncertain = 0.05, kByEffects = 10;  // of the axis's own, as a ratio
-  const auto& effects = fit.parameters.effects;
-  if (std::any_of(effects.begin(), effects.end(),
-                  [](const ActiveEffect& active) { return active.effect->remembers(); }))
-    return false;
+  if (remembers(fit.parameters)) return false;
   std::optional<Eigen::MatrixXd> alone;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     for (std::size_t component = 0; component < kAxisCount; ++component) {
@@ -112,12 +124,7 @@ bool cancel_each_other(const EnlargedFit& fit) {
 
 bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
                          double most) {
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const auto own = static_cast<Eigen::Index>(i);
-    const double ratio = parameters.twelve[i](own) / start.twelve[i](own);
-    if (!(ratio > 1 / most && ratio < most)) return false;
-  }
-  return true;
+  return remembers(parameters) || are_about_the_size(parameters, start, most);
 }
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {

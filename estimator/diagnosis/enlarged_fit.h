@@ -36,7 +36,7 @@ struct EnlargedFit : EnlargedEstimate {
 };
 
 /// Whether the sensitivity of each axis to its own direction is within a ratio of `most` of what it
-/// was. Where it is not, effects have taken its place.
+/// was. Where it is not, effects have taken its place; beside creep that of rest may be anything.
 bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
                          double most);
 
