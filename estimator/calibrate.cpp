@@ -344,23 +344,6 @@ PropagatedEstimate propagated(const PerAxis<AxisWork>& work, const PerAxis<doubl
   return estimate;
 }
 
-/// Whether a reading is said to follow the time in a way that has no name.
-bool follows_the_time(const Diagnosis& diagnosis) {
-  return std::any_of(
-      diagnosis.unlisted.begin(), diagnosis.unlisted.end(), [](const UnlistedStructure& found) {
-        return found.driver == "t_s" && (found.form == "bias" || found.form == "scale");
-      });
-}
-
-/// Whether the record of any axis shows noise that is smoother than a walk: one triad, one kind.
-bool records_show_smooth_noise(const CalibrationInput& input, const PerAxis<NoiseModel>& noise) {
-  const NoiseProcesses processes = noise_processes(
-      pose_windows(input.run.samples, input.run.poses, static_step_s(input.static_record)), true);
-  return std::any_of(noise.begin(), noise.end(), [&](const NoiseModel& model) {
-    return NoisePool(processes, model, {}).record_shows_smooth_noise();
-  });
-}
-
 /// With or without smooth noise.
 Calibration calibrate_with(const CalibrationInput& given, const CalibrationOptions& options,
                            bool smooth) {
@@ -507,7 +490,11 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   Calibration result = calibrate_with(given, options, false);
   // Decided again only then: what follows a column does so while the record is taken, too, and
   // would hide in noise as smooth as that.
-  if (follows_the_time(result.diagnosis) && records_show_smooth_noise(given, result.noise))
+  const std::vector<UnlistedStructure>& unlisted = result.diagnosis.unlisted;
+  if (std::any_of(unlisted.begin(), unlisted.end(),
+                  [](const UnlistedStructure& found) { return found.follows_the_time(); }) &&
+      records_show_smooth_noise(result.noise, pose_windows(given.run.samples, given.run.poses,
+                                                           static_step_s(given.static_record))))
     result = calibrate_with(given, options, true);
   return result;
 }

@@ -125,6 +125,8 @@ struct UnlistedStructure : Ambiguity {
   bool is_of_noise() const { return shape.starts_with("noise, "); }
   /// Whether it is slow noise that the static record knows nothing of.
   bool is_wandering() const { return is_of_noise() && form == "bias"; }
+  /// Whether a reading, not the head, is said to follow the time.
+  bool follows_the_time() const { return driver == "t_s" && (form == "bias" || form == "scale"); }
 };
 
 enum class Verdict { clean, explained, partly_explained, unexplained, undetermined };

@@ -20,6 +20,7 @@ bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, s
 
 constexpr double kLargestChange = 3, kLikelyChange = 2;  // of a sensitivity, as ratios
 
+/// Of the sensitivities, each to its own direction.
 bool are_about_the_size(const EnlargedParameters& parameters, const EnlargedParameters& start,
                         double most) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {

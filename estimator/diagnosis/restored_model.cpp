@@ -7,6 +7,7 @@
 
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
+#include "estimator/effects/driver.h"
 #include "estimator/effects/smooth_term.h"
 
 namespace plumbline {
@@ -55,7 +56,7 @@ bool has_columns(std::vector<std::string> columns, const VisitLog& log, Restored
 
 /// The column behind a driver, if it is one that the calibration run recorded.
 std::vector<std::string> columns_behind(const std::string& driver, const RunHistory& history) {
-  const std::string column = driver.substr(0, driver.rfind(".rate"));
+  const std::string column = recorded_column(driver);
   const auto& names = history.covariate_names;
   const bool recorded = column == kTemperatureColumn
                             ? history.has_temperature
@@ -103,11 +104,8 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
   for (const UnlistedStructure& found : model.unlisted) {
     if (found.is_of_noise()) continue;  // it is in no mean
     const std::size_t before = parameters.effects.size();
-    if (!has_columns(columns_behind(found.driver, model.history), log, restored)) {
-      restored.left_out.push_back("unlisted: " + found.driver);
-      continue;
-    }
-    if (const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape))
+    const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape);
+    if (has_columns(columns_behind(found.driver, model.history), log, restored) && term != nullptr)
       restore(*term, found.axes, found.parameters, parameters);
     if (parameters.effects.size() == before)
       restored.left_out.push_back("unlisted: " + found.driver);

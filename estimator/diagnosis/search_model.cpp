@@ -162,9 +162,11 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
   if (!list_.candidates[candidate].of_one_coarse_reading) return log_p_gaussian;
   const auto before_V = predict_means_V(input_.log, before.parameters);
   const auto with_V = predict_means_V(input_.log, with.parameters);
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    if ((with_V[i] - before_V[i]).lpNorm<Eigen::Infinity>() > input_.log.step_V(i))
-      return log_p_gaussian;
+  PerAxis<double> moved_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    moved_V[i] = (with_V[i] - before_V[i]).lpNorm<Eigen::Infinity>();
+    if (moved_V[i] > input_.log.step_V(i)) return log_p_gaussian;
+  }
   // The axes round independently of each other: Fisher's sum of their log-probabilities.
   const Eigen::Index n = std::ssize(input_.log.visits);
   double sum = 0;
@@ -175,10 +177,9 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
     if (!(of_axis > 0)) continue;
     // Rounding makes single means stray, but no further than it moves any: once to one side, where
     // it is undone to the other.
-    const double moved_V = (with_V[axis] - before_V[axis]).lpNorm<Eigen::Infinity>();
     const double strays_V =
         2 * largest_rounding_bias_V(input_.log.step_V(axis), input_.log.input_sd_V[axis]);
-    const double beyond = std::sqrt(of_axis) * std::max(0.0, 1 - strays_V / moved_V);
+    const double beyond = std::sqrt(of_axis) * std::max(0.0, 1 - strays_V / moved_V[axis]);
     const double p =
         std::min(f_tail(of_axis, 1, kDofOfCoarseReadings), normal_two_sided_tail(beyond));
     sum -= 2 * std::log(std::max(p, std::numeric_limits<double>::min()));

@@ -124,11 +124,15 @@ bool Driver::varies() const {
   });
 }
 
+std::string recorded_column(const std::string& driver) {
+  return driver.substr(0, driver.find(".rate"));
+}
+
 std::string Driver::unit() const {
   if (is_clock()) return "s";
   if (angle || name == "h_deg") return "rad";
   if (recorded) {
-    const std::string column = name.substr(0, name.find(".rate"));
+    const std::string column = recorded_column(name);
     const std::size_t at = column.rfind('_');
     std::string of_column = at == std::string::npos ? "" : column.substr(at + 1);
     if (column == kTemperatureColumn) of_column = "K";

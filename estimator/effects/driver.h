@@ -41,6 +41,9 @@ struct Driver {
 };
 using DriverPointer = std::shared_ptr<const Driver>;
 
+/// What a driver is of, if that was recorded: the name without what makes it a rate.
+std::string recorded_column(const std::string& driver);
+
 /// Time, angles, the specific force, what came before, and every recorded column with its rate of
 /// change.
 std::vector<Driver> instantaneous_drivers(const VisitLog& log);

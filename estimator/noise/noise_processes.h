@@ -16,7 +16,7 @@ namespace plumbline {
 /// of real flicker, of several relaxations or of walks that level off, is a sum of these. Last, if
 /// asked for, the ramp of Kostyuk & Lakoza (2012, eq. 6), a second-order process smoother than any
 /// of them, with bends about the frequency of one turn in a run. What is smooth may as well be an
-/// effect: it is asked for where a static record shows it.
+/// effect: it is asked for where a course of the time was found and a static record shows as much.
 struct NoiseProcesses {
   static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
   static constexpr Eigen::Index kFirstSlow = kTermB;

@@ -137,25 +137,17 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
   record_apart_ = apart();
 }
 
-NoisePool::Climb NoisePool::climb_of_record(bool smooth) const {
-  Eigen::VectorXd first = starting_powers();
-  std::vector<bool> free = free_powers();
-  for (Eigen::Index i = processes_->first_smooth(); !smooth && i < processes_->count(); ++i) {
-    first(i) = 0;
-    free[static_cast<std::size_t>(i)] = false;
-  }
-  return climb(first, free,
+NoisePool::Climb NoisePool::climb_of_record() const {
+  return climb(starting_powers(), free_powers(),
                [this](const Eigen::VectorXd& power) { return record_at(power, record_); });
 }
 
-bool NoisePool::record_shows_smooth_noise() const {
-  constexpr double kClearly = 8;  // of −2 ln L
-  return record_.shared.size() > 0 &&
-         climb_of_record(true).top.deviance < climb_of_record(false).top.deviance - kClearly;
+double NoisePool::deviance_of_record() const {
+  return record_.shared.size() > 0 ? climb_of_record().top.deviance : 0;
 }
 
 NoisePool::Record NoisePool::apart() const {
-  const Eigen::VectorXd power = climb_of_record(true).top.power;
+  const Eigen::VectorXd power = climb_of_record().top.power;
   Record apart = record_;
   apart.price = kPriceOfApart;
   for (const Eigen::Index i : processes_->walks()) {
@@ -411,7 +403,7 @@ std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
                                                       const Eigen::VectorXd& mean,
                                                       const Eigen::MatrixXd& design) const {
   if (record_.shared.size() == 0) return std::nullopt;
-  const Climb of_record = climb_of_record(true);
+  const Climb of_record = climb_of_record();
   const PooledNoise of_run =
       NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);
   return Contradiction{both.deviance - of_record.top.deviance - of_run.deviance,
@@ -428,6 +420,16 @@ PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& m
   const double deviance = of_run + (is_apart ? apart : shared);
   return {power, covariance(power), deviance, deviance - projector.log_determinant_of_design,
           true,  is_apart};
+}
+
+bool records_show_smooth_noise(const PerAxis<NoiseModel>& noise,
+                               const std::vector<SampleWindow>& windows) {
+  constexpr double kClearly = 8;  // of −2 ln L
+  const NoiseProcesses rough = noise_processes(windows), smooth = noise_processes(windows, true);
+  return std::any_of(noise.begin(), noise.end(), [&](const NoiseModel& model) {
+    return NoisePool(smooth, model, {}).deviance_of_record() <
+           NoisePool(rough, model, {}).deviance_of_record() - kClearly;
+  });
 }
 
 NoiseModel without_record(NoiseModel model) {

@@ -64,8 +64,8 @@ class NoisePool {
   /// is the projector of their Σ and of the design.
   Eigen::MatrixXd information_of(const PooledNoise& noise, const Eigen::MatrixXd& P,
                                  const std::vector<Eigen::Index>& wanted) const;
-  /// Whether the record is clearly likelier with the smooth processes than without.
-  bool record_shows_smooth_noise() const;
+  /// −2 ln of the record's own likelihood, where that leads, but for a constant; 0 without one.
+  double deviance_of_record() const;
   /// Whether the record and the run can be of one noise; nothing without a record. `both`: what
   /// pool() found for this mean and design.
   std::optional<Contradiction> contradiction(const PooledNoise& both, const Eigen::VectorXd& mean,
@@ -90,8 +90,8 @@ class NoisePool {
   }
   /// The record's restricted likelihood and its derivatives; zero without a record.
   Point record_at(const Eigen::VectorXd& power, const Record& record) const;
-  /// Where the record by itself leads, with or without the smooth processes.
-  Climb climb_of_record(bool smooth) const;
+  /// Where the record by itself leads.
+  Climb climb_of_record() const;
   /// The record with slow noise of its own.
   Record apart() const;
   Eigen::MatrixXd lower_covariance(const Eigen::VectorXd& power) const;
@@ -135,6 +135,11 @@ class NoisePool {
   Eigen::VectorXd known_V2_;  ///< extra variance
   Record record_, record_apart_;
 };
+
+/// Whether the record of any axis is clearly likelier with the smooth processes than without: one
+/// triad, one kind of noise. `windows`: of the run, which says how slow they are.
+bool records_show_smooth_noise(const PerAxis<NoiseModel>& noise,
+                               const std::vector<SampleWindow>& windows);
 
 /// A model that knows nothing of the noise but leaves all of it to the run.
 NoiseModel without_record(NoiseModel model);

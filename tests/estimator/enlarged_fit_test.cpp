@@ -12,6 +12,24 @@
 namespace plumbline {
 namespace {
 
+// White noise of 0.1 mV in every mean.
+PoseWhitening white_noise(const VisitLog& log) {
+  PoseWhitening whitening;
+  const auto n = std::ssize(log.visits);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    whitening.set(i, 1e-8 * Eigen::MatrixXd::Identity(n, n));
+    whitening.dwell_sd_V[i] = Eigen::VectorXd::Ones(log.dwell_contrasts());
+  }
+  return whitening;
+}
+
+EnlargedParameters truth_of(const SyntheticRun& data) {
+  EnlargedParameters truth;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    truth.twelve[i] = Eigen::Map<const Eigen::Vector4d>(data.truth[i].data());
+  return truth;
+}
+
 // Two waves of the x axis in the time, of so many cycles in the run each, fitted with their periods
 // held to readings that hold the sum of two waves of 3 and of 5 cycles.
 EnlargedFit fit_of_two_waves(double cycles, double other_cycles) {
@@ -27,21 +45,13 @@ EnlargedFit fit_of_two_waves(double cycles, double other_cycles) {
     const double turn = 2 * std::numbers::pi * t_s[static_cast<std::size_t>(k)] / span_s;
     observed.mean_V[0](k) += 1e-3 * (std::sin(3 * turn) + std::sin(5 * turn));
   }
-  PoseWhitening whitening;
-  const Eigen::Index n = observed.mean_V[0].size();
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    whitening.set(i, 1e-8 * Eigen::MatrixXd::Identity(n, n));
-    whitening.dwell_sd_V[i] = Eigen::VectorXd::Ones(log.dwell_contrasts());
-  }
   const auto wave_in_time = wave(clock, {TermForm::bias}, {1.5, 0.5, 40});
-  EnlargedParameters start;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    start.twelve[i] = Eigen::Map<const Eigen::Vector4d>(data.truth[i].data());
+  EnlargedParameters start = truth_of(data);
   for (const double each : {cycles, other_cycles})
     start = with_effect(
         std::move(start),
         with_shapes_held(activate(*wave_in_time, 0, {{t_s.front(), span_s / each, 1e-3, 1e-3}})));
-  return fit_enlarged(log, observed, whitening, start);
+  return fit_enlarged(log, observed, white_noise(log), start);
 }
 
 TEST(EnlargedFit, IsNotDeterminedWhereEffectsAreLargeDifferencesOfEachOther) {
@@ -59,18 +69,10 @@ TEST(EnlargedFit, IsNotDeterminedWhereASensitivityIsFarFromWhatItWas) {
   const SyntheticRun data = synthetic_run(3, kSixteenBits);
   const VisitLog log = make_visit_log(data.run, data.description);
   const Observations observed = observe(data.run, log);
-  const Eigen::Index n = observed.mean_V[0].size();
-  PoseWhitening whitening;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    whitening.set(i, 1e-8 * Eigen::MatrixXd::Identity(n, n));
-    whitening.dwell_sd_V[i] = Eigen::VectorXd::Ones(log.dwell_contrasts());
-  }
   const auto fit_from = [&](double share_of_K_yy) {
-    EnlargedParameters start;
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      start.twelve[i] = Eigen::Map<const Eigen::Vector4d>(data.truth[i].data());
+    EnlargedParameters start = truth_of(data);
     start.twelve[1](1) *= share_of_K_yy;
-    return fit_enlarged(log, observed, whitening, start);
+    return fit_enlarged(log, observed, white_noise(log), start);
   };
   EXPECT_TRUE(fit_from(0.8).determined);
   EXPECT_FALSE(fit_from(0.4).determined);
