@@ -13,6 +13,7 @@
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/effects/code_evidence.h"
+#include "estimator/effects/dwell_line.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/axis_tools.h"
 #include "estimator/fit/eight_state_filter.h"
@@ -24,6 +25,7 @@
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/identify.h"
 #include "estimator/noise/longest_stretch.h"
+#include "estimator/noise/periodic_noise.h"
 #include "estimator/noise/powers_allowance.h"
 #include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
@@ -262,9 +264,10 @@ void follow_convergence(const Experiment& experiment, const AxisWork& work, doub
   constexpr double kPriorSd = 1e3;  // V/g and V: leaves a part in 1e16
   const Gravity& gravity = experiment.input.description.gravity;
   const auto& unit = experiment.processes.unit;
-  const Eigen::VectorXd white_V2 = work.own_V2 +
-                                   work.pooled.power(kTermQ) * unit[kTermQ].diagonal() +
-                                   work.pooled.power(kTermN) * unit[kTermN].diagonal();
+  Eigen::VectorXd white_V2 = work.own_V2 + work.pooled.power(kTermQ) * unit[kTermQ].diagonal() +
+                             work.pooled.power(kTermN) * unit[kTermN].diagonal();
+  for (Eigen::Index row = 0; row < white_V2.size(); ++row)
+    white_V2(row) += experiment.processes.variance_of_bands(work.pooled.power, row);
 
   RecursiveLeastSquares recursive(kPriorSd);
   EightStateFilter filter(work.noise, filter_options(experiment.poses),
@@ -344,9 +347,9 @@ PropagatedEstimate propagated(const PerAxis<AxisWork>& work, const PerAxis<doubl
   return estimate;
 }
 
-/// With or without smooth noise.
-Calibration calibrate_with(const CalibrationInput& given, const CalibrationOptions& options,
-                           bool smooth) {
+/// In noise that may hold more than that of every run.
+Calibration calibrate_in(const FurtherNoise& further, const PerAxis<NoiseModel>& identified,
+                         const CalibrationInput& given, const CalibrationOptions& options) {
   RunDescription description = given.description;
   if (description.adc) description.adc = aligned_with(given.run.samples, *description.adc);
   const CalibrationInput input{given.run, given.static_record, description};
@@ -378,15 +381,18 @@ Calibration calibrate_with(const CalibrationInput& given, const CalibrationOptio
   std::optional<VisitLog> log;
   std::vector<NoiseDriver> noise_follows;
   if (n >= kFewestPosesToDecide) {
-    log = make_visit_log(input.run, input.description);
+    log = make_visit_log(input.run, input.description, further.bands);
     noise_follows = noise_drivers(
         *log, input.run, {time_blocks(experiment.poses), position_blocks(experiment.poses)});
     for (const NoiseDriver& driver : noise_follows)
       experiment.noisier_V2[driver.axis] += driver.excess_V2;
   }
 
-  parallel_for(kAxisCount, [&](std::size_t axis) { result.noise[axis] = identify(input, axis); });
-  experiment.processes = noise_processes(experiment.windows, smooth);
+  result.noise = identified;
+  for (NoiseModel& noise : result.noise)
+    if (!further.bands.empty() && !noise.record.lines.empty())
+      add_remark(noise.remark, "in the run the line wanders, and is part of the noise");
+  experiment.processes = noise_processes(experiment.windows, further);
   PerAxis<AxisWork> work;
   parallel_for(kAxisCount, [&](std::size_t axis) {
     work[axis] = fit_axis(experiment, result.noise[axis], axis);
@@ -483,19 +489,59 @@ Calibration calibrate_with(const CalibrationInput& given, const CalibrationOptio
   return result;
 }
 
+/// The same of the means of a run, beside the twelve parameters.
+std::vector<FurtherNoise> possible_noises(const CalibrationInput& input,
+                                          const PerAxis<NoiseModel>& noise,
+                                          const std::vector<SampleWindow>& windows) {
+  const std::vector<PoseMean> poses = pose_means(input.run);
+  PerAxis<Eigen::VectorXd> mean_V;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) mean_V[axis] = mean_voltages(poses, axis);
+  return possible_noises(noise, windows, mean_V, design_matrix(poses, input.description.gravity));
+}
+
+/// Whether another kind of noise might lead elsewhere: a line that wanders is found as many things
+/// where it is no noise, and where it is, a steady one hides in it.
+bool leaves_open(const Calibration& result, const MeasurementSet& run,
+                 const FurtherNoise& further) {
+  if (further.bands.empty())
+    return !result.diagnosis.effects.empty() || !result.diagnosis.unlisted.empty();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    Eigen::VectorXd left(std::ssize(result.pose_results));  // of any unit
+    for (Eigen::Index k = 0; k < left.size(); ++k)
+      left(k) = result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[axis];
+    if (line_through_dwells(run, axis) || line_between_dwells(run, left)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& options) {
   assert(given.run.has_angles && !given.run.poses.empty());
-  Calibration result = calibrate_with(given, options, false);
+  PerAxis<NoiseModel> noise;
+  parallel_for(kAxisCount, [&](std::size_t axis) { noise[axis] = identify(given, axis); });
+  const std::vector<SampleWindow> windows =
+      pose_windows(given.run.samples, given.run.poses, static_step_s(given.static_record));
+  const std::vector<FurtherNoise> noises = possible_noises(given, noise, windows);
+  FurtherNoise further = noises.front();
+  Calibration result = calibrate_in(further, noise, given, options);
+  if (noises.size() > 1 && leaves_open(result, given.run, further)) {
+    Calibration other = calibrate_in(noises.back(), noise, given, options);
+    const double price = further.bands.empty() ? kPriceOfBands : -kPriceOfBands;
+    if (other.deviance < result.deviance - price) {
+      further = noises.back();
+      result = std::move(other);
+    }
+  }
   // Decided again only then: what follows a column does so while the record is taken, too, and
   // would hide in noise as smooth as that.
   const std::vector<UnlistedStructure>& unlisted = result.diagnosis.unlisted;
   if (std::any_of(unlisted.begin(), unlisted.end(),
                   [](const UnlistedStructure& found) { return found.follows_the_time(); }) &&
-      records_show_smooth_noise(result.noise, pose_windows(given.run.samples, given.run.poses,
-                                                           static_step_s(given.static_record))))
-    result = calibrate_with(given, options, true);
+      records_show_smooth_noise(noise, windows)) {
+    further.smooth = true;
+    result = calibrate_in(further, noise, given, options);
+  }
   return result;
 }
 

@@ -36,14 +36,16 @@ AxisEstimate axis_of(const EnlargedFit& fit, std::size_t axis) {
   return {fit.parameters.twelve[axis], fit.covariance.block<4, 4>(at, at)};
 }
 
-/// Variance of a visit's mean but for the drifts, which are states of the filters.
+/// Variance of a visit's mean but for the drifts, which are states of the filters. To them a
+/// disturbance of narrow band is one more error of each mean.
 double own_variance_V2(const ExplainInput& input, const SearchResult& found, std::size_t axis,
                        std::size_t visit) {
   const PooledNoise& pooled = found.noise[axis];
   const SampleWindow& window = input.windows[visit];
   const double duration_s = window.step_s * static_cast<double>(window.count);
+  const auto row = static_cast<Eigen::Index>(visit);
   return pooled.power(kTermN) / duration_s + 2 * pooled.power(kTermQ) / (duration_s * duration_s) +
-         found.own_V2[axis](static_cast<Eigen::Index>(visit));
+         input.processes.variance_of_bands(pooled.power, row) + found.own_V2[axis](row);
 }
 
 NoiseModel filter_noise(const ExplainInput& input, const SearchInput& search,
@@ -158,6 +160,14 @@ PropagatedEstimate propagated(const VisitLog& log, const EnlargedFit& fit,
   return estimate;
 }
 
+/// Schwarz's criterion of the pose means under the model and the noise that were found.
+double deviance_of(const SearchResult& found) {
+  const double readings = static_cast<double>(found.fit.whitened_residual.size());
+  double sum = std::log(readings) * static_cast<double>(found.fit.covariance.rows());
+  for (const PooledNoise& noise : found.noise) sum += noise.likelihood_deviance;
+  return sum;
+}
+
 /// Whether what is left of an axis is clearly more than its noise leaves.
 bool is_far_beyond(double rms_mps2, const AxisVerdictInput& noise) {
   constexpr double kRatio = 1.5, kStandardUncertainties = 5;
@@ -190,6 +200,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     add_noise(wanders_beyond_record(search, found), model, diagnosis);
   };
   const auto without_effects = [&]() -> std::optional<Explained> {
+    result.deviance = deviance_of(found);
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
     add_noise_to(result.diagnosis, {});
     return std::nullopt;
@@ -258,6 +269,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
   PerAxis<std::optional<AxisVerdictInput>> residual;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
+  result.deviance = deviance_of(found);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = found.fit.parameters.mps2_per_V(i);
     result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);

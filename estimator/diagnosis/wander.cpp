@@ -26,7 +26,8 @@ Left half_of(const Left& whole, Eigen::Index first, Eigen::Index count) {
 }
 
 NoiseProcesses half_of(const NoiseProcesses& whole, Eigen::Index first, Eigen::Index count) {
-  NoiseProcesses half{whole.decay_per_s, whole.bend_rad_per_s, {}, whole.is_diagonal};
+  NoiseProcesses half = whole;
+  half.unit.clear();
   for (const Eigen::MatrixXd& unit : whole.unit)
     half.unit.emplace_back(unit.block(first, first, count, count));
   return half;

@@ -150,9 +150,17 @@ double share_left(const Dwells& dwells, double f_hz) {
   return dwells.slow_is_left ? slow : 1 - slow;
 }
 
-/// Power of the dwells together at a frequency, as large as if nothing had been removed.
+/// By what a power at this frequency is to be multiplied to be as large as if nothing had been
+/// removed. In means at even distances all aliases are alike but for that: a little less prefers
+/// the one that needs the smallest amplitude.
+double restored(const Dwells& dwells, double f_hz) {
+  constexpr double kLess = 0.01;
+  return std::pow(share_left(dwells, f_hz), (dwells.slow_is_left ? kLess : 0) - 1);
+}
+
+/// Power of the dwells together at a frequency.
 double joint_power(const Dwells& dwells, double f_hz) {
-  return std::norm(components(dwells, f_hz).sum()) / share_left(dwells, f_hz);
+  return std::norm(components(dwells, f_hz).sum()) * restored(dwells, f_hz);
 }
 
 /// The frequency within ±width/2 of `f_hz` at which the dwells together have most power; `f_hz`
@@ -220,13 +228,16 @@ struct Peak {
 };
 Peak peak_at(const Dwells& dwells, double f_hz) {
   return {f_hz, joint_power(dwells, f_hz),
-          components(dwells, f_hz).abs2().sum() / share_left(dwells, f_hz)};
+          components(dwells, f_hz).abs2().sum() * restored(dwells, f_hz)};
 }
 
 /// Whether the phases of the dwells prefer one frequency to another beyond doubt.
-bool is_clearly_likelier(const Peak& peak, const Peak& other, Eigen::Index dwells) {
+bool is_clearly_likelier(const Peak& peak, const Peak& other, const Dwells& dwells) {
   constexpr double kClearly = 10;  // of ln L
-  const double noise_V2 = peak.apart_V2 - peak.joint_V2 / static_cast<double>(dwells);
+  // A mean, being real, shows one side of a sine only: half of its power.
+  const double sides = dwells.slow_is_left ? 2 : 1;
+  const double noise_V2 =
+      peak.apart_V2 - sides * peak.joint_V2 / static_cast<double>(dwells.t_s.size());
   return peak.joint_V2 - other.joint_V2 > kClearly * noise_V2;
 }
 
@@ -245,12 +256,12 @@ Peak strongest_alias(const Dwells& dwells, double f_hz, double width_hz,
   Peak best = strongest_near(f_hz);
   if (best.f_hz > 0.5 * rate_hz) {
     const Peak mirrored = peak_at(dwells, rate_hz - best.f_hz);
-    if (!is_clearly_likelier(best, mirrored, dwells.t_s.size())) best = mirrored;
+    if (!is_clearly_likelier(best, mirrored, dwells)) best = mirrored;
   }
   for (int rates = 1; dwells.tell_aliases() && rates <= kRates; ++rates)
     for (const double side : {-1, 1}) {
       const Peak other = strongest_near(rates * rate_hz + side * f_hz);
-      if (is_clearly_likelier(other, best, dwells.t_s.size())) best = other;
+      if (is_clearly_likelier(other, best, dwells)) best = other;
     }
   return best;
 }

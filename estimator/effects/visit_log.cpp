@@ -67,6 +67,25 @@ Eigen::VectorXd left_by_twelve_V(const VisitLog& log, std::size_t axis) {
   return mean_V - A * A.colPivHouseholderQr().solve(mean_V);
 }
 
+/// What is removed as slow leaves of a strong line that hardly changes within a dwell what looks
+/// like a weak one; the means show of one that does change less than there is.
+std::optional<DwellLine> stronger(const std::optional<DwellLine>& through,
+                                  const std::optional<DwellLine>& between) {
+  constexpr double kClearly = 2;
+  if (!through || !between) return through ? through : between;
+  return between->amplitude_V > kClearly * through->amplitude_V ? between : through;
+}
+
+/// Whether within a dwell a line cannot be told from a disturbance that is part of the noise.
+bool is_in_noise(const DwellLine& line, const Visit& visit, const std::vector<NarrowBand>& bands) {
+  constexpr double kPeriods = 1.5;  // more, or fewer, in a dwell
+  const double alias_hz = std::abs(std::remainder(line.f_hz, 1 / visit.step_s));
+  const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+  return std::any_of(bands.begin(), bands.end(), [&](const NarrowBand& band) {
+    return std::abs(alias_hz - band.f_hz) * dwell_s < kPeriods;
+  });
+}
+
 /// Whether anything lacks a bit that never changes. Where positions give few different readings of
 /// an axis, all of them may have a bit alike by chance, and then the model explains them.
 bool is_missed(const StuckBit& stuck, const VisitLog& log, const MeasurementSet& set,
@@ -245,7 +264,8 @@ bool rounds_or_lacks_the_lowest_bit(const CodeFaults& codes) {
 
 }  // namespace
 
-VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description) {
+VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description,
+                        const std::vector<NarrowBand>& bands) {
   const SampleTable& samples = set.samples;
   VisitLog log;
   log.gamma = description.gravity.local_mps2 / kStandardGravity_mps2;
@@ -292,8 +312,9 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
-    log.line[i] = line_through_dwells(set, i);
-    if (!log.line[i]) log.line[i] = line_between_dwells(set, left_by_twelve_V(log, i));
+    log.line[i] =
+        stronger(line_through_dwells(set, i), line_between_dwells(set, left_by_twelve_V(log, i)));
+    if (log.line[i] && is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
   });
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))

@@ -13,6 +13,7 @@
 #include "estimator/effects/dwell_line.h"
 #include "estimator/kinematics.h"
 #include "estimator/measurement.h"
+#include "estimator/noise/covariance.h"
 
 namespace plumbline {
 
@@ -118,7 +119,9 @@ Eigen::MatrixXd step_contrasts(std::size_t samples);
 /// The contrasts of a visit's dwell: VisitLog::contrasts says which.
 Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<DwellLine>>& lines);
 
-/// Without angles those of the visits are zero. Precondition: every pose has a sample.
-VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description);
+/// Without angles those of the visits are zero. `bands`: what there is of lines near them is part
+/// of the noise. Precondition: every pose has a sample.
+VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& description,
+                        const std::vector<NarrowBand>& bands = {});
 
 }  // namespace plumbline

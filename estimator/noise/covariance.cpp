@@ -74,6 +74,38 @@ Eigen::MatrixXd smooth_walk(const std::vector<SampleWindow>& windows, double ben
   return covariance;
 }
 
+std::vector<SampleWindow> without_pauses(std::vector<SampleWindow> windows) {
+  for (std::size_t k = 1; k < windows.size(); ++k)
+    windows[k].first_s = windows[k - 1].first_s + windows[k - 1].duration_s();
+  return windows;
+}
+
+double share_of_sine(const SampleWindow& window, double f_hz) {
+  // Dirichlet's kernel.
+  const double half = std::numbers::pi * f_hz * window.step_s;
+  const double n = static_cast<double>(window.count);
+  return std::abs(std::sin(half)) < 1e-12 ? std::cos(n * half) / std::cos(half)
+                                          : std::sin(n * half) / (n * std::sin(half));
+}
+
+Eigen::MatrixXd narrow_band(const std::vector<SampleWindow>& windows, const NarrowBand& band) {
+  const auto n = static_cast<Eigen::Index>(windows.size());
+  Eigen::MatrixXd covariance(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const SampleWindow& a = windows[static_cast<std::size_t>(i)];
+    const double share = share_of_sine(a, band.f_hz);
+    for (Eigen::Index j = i; j < n; ++j) {
+      const SampleWindow& b = windows[static_cast<std::size_t>(j)];
+      const double apart_s = middle_s(b) - middle_s(a);
+      covariance(i, j) = share * share_of_sine(b, band.f_hz) *
+                         std::exp(-apart_s * band.decay_per_s) *
+                         std::cos(2 * std::numbers::pi * band.f_hz * apart_s);
+      covariance(j, i) = covariance(i, j);
+    }
+  }
+  return covariance;
+}
+
 std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::vector<Pose>& poses,
                                        double single_step_s) {
   std::vector<SampleWindow> windows;

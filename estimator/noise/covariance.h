@@ -47,6 +47,23 @@ Eigen::MatrixXd bounded_walk(const std::vector<SampleWindow>& windows, double de
 /// changes within a window, and is taken in the middle of each.
 Eigen::MatrixXd smooth_walk(const std::vector<SampleWindow>& windows, double bend_rad_per_s);
 
+/// A disturbance of narrow band: a sine whose amplitude and phase wander.
+struct NarrowBand {
+  double f_hz = 0;
+  double decay_per_s = 0;  ///< inverse of the time over which it forgets its phase
+};
+
+/// The same windows as if each began where the one before ends.
+std::vector<SampleWindow> without_pauses(std::vector<SampleWindow> windows);
+
+/// Share of a sine's amplitude that the mean of the window keeps; its sign is that of the sine in
+/// the middle of the window.
+double share_of_sine(const SampleWindow& window, double f_hz);
+
+/// Covariance of the window means of exp(−|τ|·decay)·cos 2πfτ, which hardly forgets within one:
+/// what a disturbance of unit variance leaves of itself there.
+Eigen::MatrixXd narrow_band(const std::vector<SampleWindow>& windows, const NarrowBand& band);
+
 /// Covariance of the window means under all identified terms, U², positive definite when white
 /// noise or rounding is present.
 Eigen::MatrixXd mean_covariance(const NoiseModel& model, const std::vector<SampleWindow>& windows);

@@ -30,11 +30,12 @@ std::vector<Eigen::Index> NoiseProcesses::walks() const {
   std::vector<Eigen::Index> all = {kTermK};
   for (Eigen::Index m = 0; m < std::min(kSlowest, std::ssize(decay_per_s)); ++m)
     all.push_back(kFirstMarkov + m);
-  for (Eigen::Index i = first_smooth(); i < count(); ++i) all.push_back(i);
+  for (Eigen::Index i = first_smooth(); i < first_band(); ++i) all.push_back(i);
   return all;
 }
 
-NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows, bool smooth) {
+NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows,
+                               const FurtherNoise& further) {
   NoiseProcesses processes;
   auto terms = unit_covariances(windows, 0);
   for (std::size_t term = 0; term < static_cast<std::size_t>(NoiseProcesses::kFirstMarkov); ++term)
@@ -55,10 +56,16 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows, bool sm
     tau_s /= NoiseProcesses::kMarkovRatio;
   }
   constexpr std::array<double, 3> kTurns = {0.5, 1.4, 4.0};  // in a run, at the bends
-  for (std::size_t k = 0; smooth && k < kTurns.size(); ++k) {
+  for (std::size_t k = 0; further.smooth && k < kTurns.size(); ++k) {
     const double bend_rad_per_s = 2 * std::numbers::pi * kTurns[k] / span_s;
     processes.bend_rad_per_s.push_back(bend_rad_per_s);
     processes.unit.push_back(about_mean_of_run(smooth_walk(windows, bend_rad_per_s)));
+  }
+  const std::vector<SampleWindow> on_clock =
+      further.bands_pause ? without_pauses(windows) : windows;
+  for (const NarrowBand& band : further.bands) {
+    processes.bands.push_back(band);
+    processes.unit.push_back(narrow_band(on_clock, band));
   }
   for (const Eigen::MatrixXd& unit : processes.unit)
     processes.is_diagonal.push_back(unit.isDiagonal(0));

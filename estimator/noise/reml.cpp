@@ -92,7 +92,7 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
   const auto& descriptions = model.descriptions;
   const auto bins = std::ssize(descriptions.front().bins);
   Eigen::MatrixXd& densities = record_.shared;
-  densities.resize(bins, processes.count());
+  densities.setZero(bins, processes.count());
   const auto density = [&](std::size_t description, Eigen::Index bin) -> const Eigen::Vector4d& {
     return descriptions[description].bins[static_cast<std::size_t>(bin)].density;
   };
@@ -138,7 +138,12 @@ NoisePool::NoisePool(const NoiseProcesses& processes, const NoiseModel& model,
 }
 
 NoisePool::Climb NoisePool::climb_of_record() const {
-  return climb(starting_powers(), free_powers(),
+  // Its lines were taken out of the record.
+  std::vector<bool> free = free_powers();
+  std::fill(free.begin() + processes_->first_band(), free.end(), false);
+  Eigen::VectorXd first = starting_powers();
+  first.tail(std::ssize(processes_->bands)).setZero();
+  return climb(first, free,
                [this](const Eigen::VectorXd& power) { return record_at(power, record_); });
 }
 
@@ -406,8 +411,11 @@ std::optional<Contradiction> NoisePool::contradiction(const PooledNoise& both,
   const Climb of_record = climb_of_record();
   const PooledNoise of_run =
       NoisePool(*processes_, without_record(model_), known_V2_).pool(mean, design, &both.power);
-  return Contradiction{both.deviance - of_record.top.deviance - of_run.deviance,
-                       of_record.top.power, of_run.power};
+  Contradiction found{both.deviance - of_record.top.deviance - of_run.deviance, of_record.top.power,
+                      of_run.power};
+  const Eigen::Index bands = std::ssize(processes_->bands);
+  found.power_of_record.tail(bands) = of_run.power.tail(bands);
+  return found;
 }
 
 PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& mean,
@@ -425,7 +433,8 @@ PooledNoise NoisePool::at(const Eigen::VectorXd& power, const Eigen::VectorXd& m
 bool records_show_smooth_noise(const PerAxis<NoiseModel>& noise,
                                const std::vector<SampleWindow>& windows) {
   constexpr double kClearly = 8;  // of −2 ln L
-  const NoiseProcesses rough = noise_processes(windows), smooth = noise_processes(windows, true);
+  const NoiseProcesses rough = noise_processes(windows),
+                       smooth = noise_processes(windows, {.smooth = true});
   return std::any_of(noise.begin(), noise.end(), [&](const NoiseModel& model) {
     return NoisePool(smooth, model, {}).deviance_of_record() <
            NoisePool(rough, model, {}).deviance_of_record() - kClearly;
@@ -471,7 +480,7 @@ NoiseModel in_filter_terms(NoiseModel model, const NoiseProcesses& processes,
                   (2 * processes.decay_per_s[m]);
   const auto strongest = std::max_element(variance.begin(), variance.end());
   double walk = pooled.power(kTermK);
-  for (Eigen::Index i = processes.first_smooth(); i < processes.count(); ++i)
+  for (Eigen::Index i = processes.first_smooth(); i < processes.first_band(); ++i)
     walk += pooled.power(i) * processes.variance_over_run(i) / processes.variance_over_run(kTermK);
   model.walk_decay_per_s = 0;
   if (strongest != variance.end() && *strongest > walk * span_s / 3) {

@@ -405,6 +405,21 @@ TEST(DwellLine, ThatHardlyChangesWithinADwellShowsInTheMeans) {
   EXPECT_NEAR(std::remainder(line->phase_rad - 0.9, 2 * std::numbers::pi), 0, 0.3);
 }
 
+// Whatever the courses of the dwells show besides: what is removed from them as slow may leave of
+// it what looks like a weaker one.
+TEST(DwellLine, AStrongOneThatHardlyChangesWithinADwellComesFirst) {
+  MeasurementSet set = dwells(4, 1e-2, 100.1, 0.9, 0.5);
+  for (std::size_t k = 0; k < set.poses.size(); ++k)
+    set.poses[k].delta_deg = 0.3 * static_cast<double>(k) * 180 / std::numbers::pi - 90;
+  for (std::size_t i = 0; i < set.samples.size(); ++i)
+    set.samples.u_V[0][i] += 3e-4 * std::sin(2 * std::numbers::pi * 23.4 * set.samples.t_s[i]);
+  ASSERT_TRUE(line_through_dwells(set, 0));
+  const auto line = make_visit_log(set, {}).line[0];
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->f_hz, 100.1, 1e-4);
+  EXPECT_FALSE(make_visit_log(set, {}, {{0.12, 0.01}}).line[0]) << "part of the noise";
+}
+
 TEST(DwellLine, WhatDiesAwayInEveryDwellIsNotSteady) {
   MeasurementSet set = dwells(6, 2e-4, 23.371, 1.2);
   EXPECT_TRUE(line_through_dwells(set, 0)->steady);

@@ -14,6 +14,7 @@
 
 #include "estimator/calibrate.h"
 #include "tests/estimator/synthetic_run.h"
+#include "tests/estimator/wandering_line.h"
 
 namespace plumbline {
 namespace {
@@ -82,6 +83,44 @@ TEST(Search, SmoothNoiseThatTheRecordShowsIsNoEffect) {
     const Calibration result = calibrated(synthetic_run(seed, kSixteenBits, options));
     EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << seed << ": " << result.diagnosis.reason;
   }
+}
+
+/// A line in record and run, three times as large as the noise of a pose, V.
+constexpr double kLine_V = 2e-4, kLine_hz = 0.564;
+SyntheticOptions long_run() {
+  SyntheticOptions options;
+  options.delta_step_deg = 20;
+  options.h_step_deg = 10;
+  options.still_s = 400;
+  return options;
+}
+
+// It was a wave of the time, a train of pulses, a step of the bias.
+TEST(Search, ALineThatWandersInRecordAndRunIsNoEffect) {
+  for (std::uint64_t seed = 0; seed < 2; ++seed) {
+    SyntheticOptions options = long_run();
+    std::mt19937_64 random(seed);
+    for (auto& more_V : options.more_V)
+      more_V = [line = wandering_line(kLine_hz, 2e-3, 1000, random)](const auto&, double t_s) {
+        return kLine_V * line(t_s);
+      };
+    const Calibration result = calibrated(synthetic_run(seed, kSixteenBits, options));
+    EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << seed << ": " << result.diagnosis.reason;
+    EXPECT_THAT(result.noise[0].remark, testing::HasSubstr("part of the noise"));
+  }
+}
+
+TEST(Search, ALineThatIsSteadyInRecordAndRunIsAnEffect) {
+  SyntheticOptions options = long_run();
+  options.more_V[0] = [](const auto&, double t_s) {
+    return kLine_V * std::sin(2 * std::numbers::pi * kLine_hz * t_s);
+  };
+  const Calibration result = calibrated(synthetic_run(1, kSixteenBits, options));
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  ASSERT_THAT(result.diagnosis.effects, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.effects.front().id, "adc.mains_pickup");
+  EXPECT_THAT(result.diagnosis.effects.front().axes, testing::ElementsAre(0));
 }
 
 // With noise of a third of a step and more, rounding hardly moves a mean.
