@@ -41,6 +41,7 @@ std::vector<NarrowBand> bands_about(const SpectralLine& line,
   const double span_s = windows.back().first_s - windows.front().first_s;
   const double apart_hz = std::max(0.5 * line.width_hz, 1 / span_s);
   std::vector<NarrowBand> bands;
+  bands.reserve(kPlaces.size());
   for (const double place : kPlaces)
     bands.push_back({line.f_hz + place * apart_hz, std::numbers::pi * apart_hz});
   return bands;
