@@ -391,7 +391,7 @@ Calibration calibrate_in(const FurtherNoise& further, const PerAxis<NoiseModel>&
   result.noise = identified;
   for (NoiseModel& noise : result.noise)
     if (!further.bands.empty() && !noise.record.lines.empty())
-      add_remark(noise.remark, "in the run the line wanders, and is part of the noise");
+      add_remark(noise.remark, "in the run the line wanders, and is counted as noise");
   experiment.processes = noise_processes(experiment.windows, further);
   PerAxis<AxisWork> work;
   parallel_for(kAxisCount, [&](std::size_t axis) {

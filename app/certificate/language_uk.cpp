@@ -471,7 +471,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"harmonic series of order {}", "гармонічний ряд порядку {}"},
     {"the static record has {} gaps", "у записі в спокої є розриви ({})"},
     {"its longest stretch of {} samples was used", "використано найдовшу ділянку, {} відліків"},
-    {"in the run the line wanders, and is part of the noise", "у вимірюваннях лінія блукає і є частиною шуму"},
+    {"in the run the line wanders, and is counted as noise", "у вимірюваннях лінія блукає й зарахована до шуму"},
     {"a periodic line at {} Hz, amplitude {}, is not noise", "періодична лінія на {} Hz з амплітудою {} не є шумом"},
     {"{} lines in all, {} of them harmonics", "усього ліній {}, з них гармонік {}"},
     {"the spectrum falls above {} Hz as no term does: the terms hold below", "вище {} Hz спектр спадає так, як жоден доданок: доданки чинні нижче"},

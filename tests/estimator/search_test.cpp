@@ -106,7 +106,7 @@ TEST(Search, ALineThatWandersInRecordAndRunIsNoEffect) {
       };
     const Calibration result = calibrated(synthetic_run(seed, kSixteenBits, options));
     EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << seed << ": " << result.diagnosis.reason;
-    EXPECT_THAT(result.noise[0].remark, testing::HasSubstr("part of the noise"));
+    EXPECT_THAT(result.noise[0].remark, testing::HasSubstr("counted as noise"));
   }
 }
 
