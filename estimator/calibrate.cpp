@@ -489,7 +489,7 @@ Calibration calibrate_in(const FurtherNoise& further, const PerAxis<NoiseModel>&
   return result;
 }
 
-/// The same of the means of a run, beside the twelve parameters.
+/// The kinds of noise that the means of this run may have beside the twelve parameters.
 std::vector<FurtherNoise> possible_noises(const CalibrationInput& input,
                                           const PerAxis<NoiseModel>& noise,
                                           const std::vector<SampleWindow>& windows) {

@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "estimator/effects/effect.h"
+#include "estimator/noise/covariance.h"
 
 namespace plumbline {
 namespace {
@@ -29,13 +30,10 @@ class MainsPickup final : public Effect {
   }
   double term_g(const TermInput& input, const double* p) const override {
     const Visit& visit = input.at();
-    const auto n = static_cast<double>(visit.count);
-    // Mean of n equally spaced values of a sine: Dirichlet's kernel about the middle of the dwell.
-    const double half = 0.5 * effect::kTurn_rad * p[1] * visit.step_s;
-    const double kernel = std::abs(std::sin(half)) < 1e-12
-                              ? std::cos(n * half) / std::cos(half)
-                              : std::sin(n * half) / (n * std::sin(half));
-    return kernel * p[0] * std::sin(phase_rad(visit, p) + (n - 1) * half);
+    const double to_middle_rad =
+        0.5 * effect::kTurn_rad * p[1] * visit.step_s * (static_cast<double>(visit.count) - 1);
+    return share_of_sine({visit.t_arrival_s, visit.step_s, visit.count}, p[1]) * p[0] *
+           std::sin(phase_rad(visit, p) + to_middle_rad);
   }
   void normalise(std::vector<double>& p) const override {
     if (p[0] < 0) p[2] += 180;

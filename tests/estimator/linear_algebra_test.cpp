@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cstddef>
 
