@@ -252,7 +252,7 @@ struct Calibration {
   std::vector<FittedTerm> fitted_terms;  ///< largest first
   /// Schwarz's criterion of the pose means but for a constant: the smaller, the better do model and
   /// noise explain them. 0 where nothing was searched.
-  double deviance = 0;
+  double schwarz_criterion = 0;
 };
 
 /// Identifies the noise, estimates the 12 parameters in three ways, tests the residual, decides.

@@ -16,8 +16,8 @@ namespace plumbline {
 /// of real flicker, of several relaxations or of walks that level off, is a sum of these. Last, if
 /// asked for, the ramp of Kostyuk & Lakoza (2012, eq. 6), a second-order process smoother than any
 /// of them, with bends about the frequency of one turn in a run, and disturbances of narrow band.
-/// What is smooth or periodic may as well be an effect: these are asked for where one was found and
-/// a static record shows as much.
+/// What is smooth or periodic may as well be an effect: these are asked for only where a static
+/// record shows as much.
 struct NoiseProcesses {
   static constexpr Eigen::Index kFirstMarkov = 4;  ///< before it the order of NoiseTermIndex
   static constexpr Eigen::Index kFirstSlow = kTermB;
