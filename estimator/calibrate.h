@@ -196,7 +196,7 @@ struct FittedTerm {
   std::string name;  ///< id of the effect; driver and shape of a structure without a name
   std::size_t axis = 0;
   std::string driver;             ///< the variable of which its values look most like a function
-  std::vector<double> at;         ///< of that, at every pose; angles in degrees
+  std::vector<double> at;         ///< of that, at every pose, as recorded; angles in degrees
   std::vector<double> term_mps2;  ///< what it adds, input-referred
 };
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "app/certificate/effect_words.h"
 #include "app/figure/plot.h"
@@ -54,6 +56,18 @@ double largest_residual(const Calibration& calibration, bool before_too) {
     for (double r : pose.residual_before_mps2) largest = std::max(largest, std::abs(r));
   }
   return largest;
+}
+
+/// What an axis has to show of these values, with a little room on both sides.
+std::pair<double, double> range(const std::vector<double>& values) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (double value : values) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  const double margin = high > low ? 0.03 * (high - low) : std::max(1e-3 * std::abs(high), 1e-9);
+  return {low - margin, high + margin};
 }
 
 constexpr std::size_t kLongestTitle = 36;  ///< characters over a panel
@@ -217,16 +231,6 @@ Figure residual_course(const FigureContext& context) {
       temp_C.push_back(p.temp_C);
     }
     if (time_min.empty()) return;
-    const auto range = [](const std::vector<double>& values) {
-      double low = std::numeric_limits<double>::infinity(), high = -low;
-      for (double value : values) {
-        if (!std::isfinite(value)) continue;
-        low = std::min(low, value);
-        high = std::max(high, value);
-      }
-      const double margin = std::max(0.03 * (high - low), 1e-3 * std::max(1.0, std::abs(high)));
-      return std::pair(low - margin, high + margin);
-    };
     const double width = with_temperature ? 380 : kFigureWidth - 76;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       std::vector<double> residual;
@@ -277,18 +281,16 @@ std::optional<Figure> fitted_terms_figure(const FigureContext& context) {
       const FittedTerm& term = calibration.fitted_terms[k];
       const std::size_t row = k / kColumns;
       std::vector<double> residual;
-      double largest = 0;
-      for (std::size_t p = 0; p < term.term_mps2.size(); ++p) {
+      for (std::size_t p = 0; p < term.term_mps2.size(); ++p)
         residual.push_back(term.term_mps2[p] +
                            calibration.pose_results[p].residual_after_mps2[term.axis]);
-        largest = std::max({largest, std::abs(residual[p]), std::abs(term.term_mps2[p])});
-      }
-      const auto [low, high] = std::minmax_element(term.at.begin(), term.at.end());
-      const double margin = 0.03 * std::max(*high - *low, 1e-9);
-      PlotAxis x{term.driver, *low - margin, *high + margin};
+      std::vector<double> shown = residual;
+      shown.insert(shown.end(), term.term_mps2.begin(), term.term_mps2.end());
+      const auto [left, right] = range(term.at);
+      const auto [low, high] = range(shown);
+      PlotAxis x{term.driver, left, right};
       x.ticks = 6;
-      PlotAxis y{k % kColumns == 0 ? context.tr("residual, m/s²") : "", -nice_ceiling(largest),
-                 nice_ceiling(largest)};
+      PlotAxis y{k % kColumns == 0 ? context.tr("residual, m/s²") : "", low, high};
       y.ticks = 4;
       Plot plot(canvas,
                 {60 + static_cast<double>(k % kColumns) * kStepX,

@@ -86,6 +86,8 @@ std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParamete
     term.at = best->value[term.axis];
     if (best->unit() == "rad")
       for (double& at : term.at) at *= kDegPerRad;
+    if (term.driver == kTemperatureColumn)
+      for (double& at : term.at) at += log.reference_C;
     term.term_mps2.assign(course_mps2.begin(), course_mps2.end());
     by_size.emplace(largest, std::move(term));
   }

@@ -272,6 +272,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
   if (description.adc) log.adc = aligned_with(samples, *description.adc);
   log.goes_as_commanded = description.goes_as_commanded;
   log.has_temperature = !samples.temp_C.empty();
+  log.reference_C = description.reference_C;
   for (const Covariate& covariate : samples.covariates) {
     log.covariate_names.push_back(covariate.name);
   }

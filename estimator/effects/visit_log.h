@@ -41,6 +41,7 @@ struct VisitLog {
   std::vector<Visit> visits;
   double gamma = 1;  ///< local over standard gravity
   bool has_temperature = false;
+  double reference_C = 0;                    ///< T₀
   std::vector<std::string> covariate_names;  ///< in the order of Visit::covariate
   /// Those of `columns` that were not recorded (kTemperatureColumn among them).
   std::vector<std::string> lacking(std::vector<std::string> columns) const;

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "tests/app/dcc_numbers.h"
+#include "tests/app/example_set.h"
 #include "tests/app/json_schema.h"
 #include "tests/app/program.h"
 #include "tests/app/temp_folder.h"

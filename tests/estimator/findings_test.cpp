@@ -355,6 +355,21 @@ TEST(Findings, AFittedTermStandsOverWhatItIsAFunctionOf) {
     EXPECT_NEAR(term.term_mps2[k], 0.02 * term.at[k] * term.at[k] * kStandardGravity_mps2, 0.02);
 }
 
+TEST(Findings, AFittedTermStandsOverTheTemperatureThatWasRecorded) {
+  SyntheticRun data = synthetic_run(7, kSixteenBits);
+  SampleTable& samples = data.run.samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    samples.temp_C.push_back(23 + 2 * std::sin(samples.t_s[k] / 20));
+    samples.u_V[2][k] += 0.005 * -0.0328 * (samples.temp_C[k] - data.description.reference_C);
+  }
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.fitted_terms.size(), 1u) << result.diagnosis.reason;
+  const FittedTerm& term = result.fitted_terms.front();
+  EXPECT_EQ(term.driver, "temp_C");
+  for (std::size_t k = 0; k < term.at.size(); ++k)
+    EXPECT_NEAR(term.at[k], result.pose_results[k].temp_C, 1e-9);
+}
+
 TEST(Findings, PosesTellRivalsApartBesideStructureWithoutAName) {
   const Calibration alone = calibrated(square_on_z());
   const Calibration beside = calibrated(square_on_z(something_happened_to_x()));

@@ -199,7 +199,7 @@ TEST(Search, AFunctionOfTheTiltDoesNotTakeThePlaceOfASensitivity) {
 // A head that comes to rest anew at every pose: no function of anything, but ten times the noise
 // that the record speaks of, so that among thousands of functions some look good.
 TEST(Search, WhatEveryPoseHasForItselfHasNoDriver) {
-  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
     SyntheticOptions options = full_grid();
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       options.more_V[axis] = [seed, axis](const std::array<double, 3>&, double t_s) {
