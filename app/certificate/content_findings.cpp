@@ -75,6 +75,10 @@ void add_terms(const Composer& c) {
         effect.definition.empty() ? effect_term(effect.id, c.tr) : one_line(effect.definition);
     if (!term.empty()) facts.rows.emplace_back(effect_name(effect.id, c.tr), term);
   }
+  for (const UnlistedStructure& found : c.input.calibration.diagnosis.unlisted)
+    if (found.driver == "temp_C")
+      facts.rows.emplace_back(unlisted_name(found, c.tr),
+                              c.tr("temp_C is counted from the reference temperature: T − T₀"));
   if (facts.rows.empty()) return;
   c.add(Paragraph{c.tr("The added terms; a in g, those of an output referred to its input:")});
   c.add(std::move(facts));

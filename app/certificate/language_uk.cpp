@@ -362,6 +362,8 @@ const Catalogue& catalogue() {
     {"ka·|a_i|", "ka·|a_i|"},
     {"k_xy·a_x·a_y + k_xz·a_x·a_z + k_yz·a_y·a_z", "k_xy·a_x·a_y + k_xz·a_x·a_z + k_yz·a_y·a_z"},
     {"+w/2 where a_i rose on the way to the position, −w/2 where it fell; start: how the first position was reached", "+w/2, якщо a_i на шляху до положення зросло, −w/2, якщо спало; start: як досягнуто першого положення"},
+    {"temp_C is counted from the reference temperature: T − T₀",
+     "temp_C відлічується від опорної температури: T − T₀"},
     {"b1·(T − T₀)", "b1·(T − T₀)"},
     {"s1·(T − T₀)·a_i", "s1·(T − T₀)·a_i"},
     {"b·exp(−t/tau)", "b·exp(−t/tau)"},
