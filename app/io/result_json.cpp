@@ -97,12 +97,7 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
            calibration.uncertainty ? uncertainty_json(*calibration.uncertainty) : Json(nullptr)},
           {"diagnosis", json_diagnosis(calibration.diagnosis)},
           {"final", to_json(calibration.final)},
-          {"error",
-           {{"before", json_errors(calibration.before)},
-            {"after", json_errors(calibration.after)},
-            {"floor",
-             {{"pose_rms", json_array(calibration.floor_pose_rms_mps2)},
-              {"u_pose_rms", json_array(calibration.u_floor_pose_rms_mps2)}}}}},
+          {"error", json_error(calibration)},
           {"decision", json_decision(calibration.decision)}};
 }
 

@@ -122,12 +122,7 @@ Json scalar_json(const ScalarCalibration& calibration, const ScalarSource& sourc
            })},
           {"scalar", std::move(scalar)},
           {"diagnosis", json_diagnosis(calibration.diagnosis)},
-          {"error",
-           {{"before", json_errors(calibration.before)},
-            {"after", json_errors(calibration.after)},
-            {"floor",
-             {{"pose_rms", json_array(calibration.floor_pose_rms_mps2)},
-              {"u_pose_rms", json_array(calibration.u_floor_pose_rms_mps2)}}}}},
+          {"error", json_error(calibration)},
           {"decision", json_decision(calibration.decision)}};
 }
 

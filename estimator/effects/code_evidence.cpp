@@ -40,6 +40,18 @@ std::optional<StuckBit> unchanging(const std::vector<std::int64_t>& codes, int b
 
 }  // namespace
 
+double smallest_step(std::vector<double> readings) {
+  std::sort(readings.begin(), readings.end());
+  double step = 0;
+  for (std::size_t k = 1; k < readings.size(); ++k) {
+    const double difference = readings[k] - readings[k - 1];
+    // Readings printed with few digits differ by rounding of the text; that is no step.
+    if (difference > 1e-9 * std::abs(readings[k]) && (step == 0 || difference < step))
+      step = difference;
+  }
+  return step;
+}
+
 Adc aligned_with(const SampleTable& readings, const Adc& declared) {
   constexpr double kTurn = 2 * std::numbers::pi;
   constexpr double kOneShift = 0.99;  // of the mean length, were all the same

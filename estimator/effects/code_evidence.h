@@ -12,6 +12,9 @@
 
 namespace plumbline {
 
+/// Smallest difference between two different readings, in their unit; 0 where all are alike.
+double smallest_step(std::vector<double> readings);
+
 /// The converter with its span moved by part of a step, so that readings lie at whole codes: some
 /// state the middle of a code, some an end of it. As declared where no one shift fits nearly all.
 Adc aligned_with(const SampleTable& readings, const Adc& declared);

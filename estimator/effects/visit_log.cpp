@@ -22,17 +22,6 @@ double mean_of(const std::vector<double>& column, const Pose& pose) {
          static_cast<double>(pose.count);
 }
 
-double smallest_step(std::vector<double> u) {
-  std::sort(u.begin(), u.end());
-  double step = 0;
-  for (std::size_t k = 1; k < u.size(); ++k) {
-    const double difference = u[k] - u[k - 1];
-    // Readings printed with few digits differ by rounding of the text; that is no step.
-    if (difference > 1e-9 * std::abs(u[k]) && (step == 0 || difference < step)) step = difference;
-  }
-  return step;
-}
-
 /// White noise of one reading from the quietest quarter of the dwells, which no faulty bit
 /// disturbs.
 double quiet_scatter_V(const MeasurementSet& set, std::size_t axis) {

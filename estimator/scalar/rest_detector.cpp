@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/effects/code_evidence.h"
+
 namespace plumbline {
 namespace {
 
@@ -29,16 +31,6 @@ struct WindowVariance {
   }
 };
 
-double resolution(std::vector<double> u) {
-  std::sort(u.begin(), u.end());
-  double step = 0;
-  for (std::size_t k = 1; k < u.size(); ++k) {
-    const double difference = u[k] - u[k - 1];
-    if (difference > 1e-9 * std::abs(u[k]) && (step == 0 || difference < step)) step = difference;
-  }
-  return step;
-}
-
 double quiet_variance(const WindowVariance& variance, const std::vector<double>& u,
                       std::size_t width) {
   constexpr double kQuantile = 0.2;
@@ -48,7 +40,7 @@ double quiet_variance(const WindowVariance& variance, const std::vector<double>&
   }
   const auto at = static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(windows.size() - 1));
   std::nth_element(windows.begin(), windows.begin() + at, windows.end());
-  const double step = resolution(u);
+  const double step = smallest_step(u);
   return std::max(windows[static_cast<std::size_t>(at)], step * step / 12);
 }
 
