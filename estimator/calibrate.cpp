@@ -74,6 +74,12 @@ bool leaves_open(const Calibration& result, const MeasurementSet& run,
   return false;
 }
 
+/// Whether a run is explained better by what was found in further noise than by what was found
+/// `without` it.
+bool is_better(const Calibration& in_further_noise, const Calibration& without) {
+  return in_further_noise.schwarz_criterion < without.schwarz_criterion - kPriceOfFurtherNoise;
+}
+
 /// Of the two kinds of noise that the means may have, the one in which Schwarz's criterion is the
 /// smaller; the less likely of them is tried only where the other leaves the question open.
 struct InItsNoise {
@@ -89,8 +95,7 @@ InItsNoise calibrate_in_likeliest(const PreparedRun& run, const CalibrationOptio
   InItsNoise chosen{first, calibrate_in_noise(first, run, options)};
   if (noises.size() > 1 && leaves_open(chosen.result, run.input.run, first)) {
     Calibration other = calibrate_in_noise(noises.back(), run, options);
-    const double price = first.bands.empty() ? kPriceOfBands : -kPriceOfBands;
-    if (other.schwarz_criterion < chosen.result.schwarz_criterion - price)
+    if (first.bands.empty() ? is_better(other, chosen.result) : !is_better(chosen.result, other))
       chosen = {noises.back(), std::move(other)};
   }
   return chosen;
@@ -112,7 +117,8 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
                   [](const UnlistedStructure& found) { return found.follows_the_time(); }) &&
       records_show_smooth_noise(run.noise, run.windows)) {
     decided.further.smooth = true;
-    return calibrate_in_noise(decided.further, run, options);
+    Calibration smooth = calibrate_in_noise(decided.further, run, options);
+    if (is_better(smooth, decided.result)) return smooth;
   }
   return decided.result;
 }

@@ -47,6 +47,9 @@ struct NoiseProcesses {
   }
 };
 
+/// By so much, of −2 ln L, must a run be likelier with further noise.
+inline constexpr double kPriceOfFurtherNoise = 8;
+
 /// What a run's noise holds beside what every noise may.
 struct FurtherNoise {
   bool smooth = false;

@@ -11,9 +11,6 @@
 
 namespace plumbline {
 
-/// By so much, of −2 ln L, must a run be likelier with a periodic disturbance in its noise.
-inline constexpr double kPriceOfBands = 8;
-
 /// The kinds of noise that a run may have, likeliest first. Where a spectral line of a static
 /// record matters in a window's mean beside white noise, two: that of every run, in which a steady
 /// line is an effect, and the same with a disturbance that wanders about the line's frequency, on

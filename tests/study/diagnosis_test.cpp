@@ -60,6 +60,21 @@ TEST(DiagnosisStudy, TellsALagBehindTheTemperatureFromSlowNoise) {
   EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
 }
 
+// It goes on while the record is taken. What remained of it beside a bend of the temperature was a
+// bell of the time; in noise as smooth as that, which the run hardly supports, all of it was lost.
+TEST(DiagnosisStudy, WhatFollowsTheTemperatureInTheRecordTooIsNotTakenForSmoothNoise) {
+  const SetOutcome outcome = run_set({.seed = 1130007,
+                                      .effects = {"own.thermal_hysteresis"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::white,
+                                      .bits = 16,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  expect_its_driver_and_no_listed_name(outcome);
+  EXPECT_LT(outcome.after.heldout, 1.2 * outcome.oracle.heldout);
+}
+
 // Shapes that a low polynomial or harmonic series does not have: what is left of them must not go
 // by listed names.
 TEST(DiagnosisStudy, EffectsWithSharpShapesHaveTheirDriverAndNoListedName) {
