@@ -79,7 +79,8 @@ std::vector<FurtherNoise> possible_noises(const PerAxis<NoiseModel>& noise,
   };
   const double of_throughout = deviance(throughout), of_pausing = deviance(pausing);
   const FurtherNoise& wandering = of_pausing < of_throughout ? pausing : throughout;
-  if (std::min(of_pausing, of_throughout) < deviance({}) - kPriceOfFurtherNoise) return {wandering, {}};
+  if (std::min(of_pausing, of_throughout) < deviance({}) - kPriceOfFurtherNoise)
+    return {wandering, {}};
   return {{}, wandering};
 }
 
