@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   using namespace plumbline;
   int units = 1000;
   std::uint64_t seed = 1;
-  std::string out = "reproduce-paper.html";
+  std::string out = "build/reproduce-paper.html";
   CLI::App program{"The paper's figures 2, 3 and 4 and its table from simulated units"};
   program.add_option("units", units, "simulated units")
       ->check(CLI::Range(2, 1000000))

@@ -113,7 +113,7 @@ int run(const fs::path& data, const fs::path& out) {
 }  // namespace plumbline::study
 
 int main(int argc, char** argv) {
-  std::string data, out = "recorded-data";
+  std::string data, out = "build/recorded-data";
   CLI::App program{"Pages on recorded data: residual, what drives it, before and after"};
   program.add_option("data", data, "folder with multiposition/ and static_long/")
       ->required()
