@@ -20,17 +20,11 @@
 namespace plumbline {
 namespace {
 
-/// Time between the samples of the static record; a thousandth of a second without one.
-double static_step_s(const SampleTable* record) {
-  const double step_s = record != nullptr ? longest_stretch(record->t_s).step_s : 0;
-  return step_s > 0 ? step_s : 1e-3;
-}
-
-NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
+/// stretch: of the static record, if there is one.
+NoiseModel identify(const CalibrationInput& input, const Stretch& stretch, std::size_t axis) {
   NoiseModel noise;
   const SampleTable* record = input.static_record;
   if (record != nullptr && record->size() > 1) {
-    const Stretch stretch = longest_stretch(record->t_s);
     const auto from = record->u_V[axis].begin() + static_cast<std::ptrdiff_t>(stretch.first);
     noise = identify_noise({from, from + static_cast<std::ptrdiff_t>(stretch.count)},
                            1.0 / stretch.step_s);
@@ -46,15 +40,19 @@ NoiseModel identify(const CalibrationInput& input, std::size_t axis) {
 }
 
 PreparedRun prepared(const CalibrationInput& input) {
+  constexpr double kStepWithoutRecord_s = 1e-3;
+  const Stretch stretch =
+      input.static_record ? longest_stretch(input.static_record->t_s) : Stretch{};
   std::vector<PoseMean> poses = pose_means(input.run);
   Eigen::MatrixXd A = design_matrix(poses, input.description.gravity);
-  PreparedRun run{
-      input,
-      std::move(poses),
-      pose_windows(input.run.samples, input.run.poses, static_step_s(input.static_record)),
-      std::move(A),
-      {}};
-  parallel_for(kAxisCount, [&](std::size_t axis) { run.noise[axis] = identify(input, axis); });
+  PreparedRun run{input,
+                  std::move(poses),
+                  pose_windows(input.run.samples, input.run.poses,
+                               stretch.step_s > 0 ? stretch.step_s : kStepWithoutRecord_s),
+                  std::move(A),
+                  {}};
+  parallel_for(kAxisCount,
+               [&](std::size_t axis) { run.noise[axis] = identify(input, stretch, axis); });
   return run;
 }
 

@@ -76,7 +76,7 @@ void add_terms(const Composer& c) {
     if (!term.empty()) facts.rows.emplace_back(effect_name(effect.id, c.tr), term);
   }
   for (const UnlistedStructure& found : c.input.calibration.diagnosis.unlisted)
-    if (found.driver == "temp_C")
+    if (found.driver == kTemperatureColumn)
       facts.rows.emplace_back(unlisted_name(found, c.tr),
                               c.tr("temp_C is counted from the reference temperature: T − T₀"));
   if (facts.rows.empty()) return;

@@ -109,7 +109,7 @@ Json json_diagnosis(const Diagnosis& diagnosis) {
   return json;
 }
 
-Json json_errors(const ErrorFigures& error) {
+Json json_error_figures(const ErrorFigures& error) {
   return {{"fit_pose_rms", json_array(error.fit_pose_rms_mps2)},
           {"heldout_pose_rms", json_array(error.heldout_pose_rms_mps2)},
           {"heldout_pose_max_abs", json_array(error.heldout_pose_max_abs_mps2)},

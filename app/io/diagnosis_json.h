@@ -6,13 +6,13 @@
 
 namespace plumbline::app {
 
-Json json_errors(const ErrorFigures& error);
 Json json_diagnosis(const Diagnosis& diagnosis);
+Json json_error_figures(const ErrorFigures& error);
 /// Before, after, and what the noise alone would leave. Result: Calibration or ScalarCalibration.
 template <class Result>
 Json json_error(const Result& result) {
-  return {{"before", json_errors(result.before)},
-          {"after", json_errors(result.after)},
+  return {{"before", json_error_figures(result.before)},
+          {"after", json_error_figures(result.after)},
           {"floor",
            {{"pose_rms", json_array(result.floor_pose_rms_mps2)},
             {"u_pose_rms", json_array(result.u_floor_pose_rms_mps2)}}}};
