@@ -16,7 +16,7 @@ constexpr double kIndistinguishable = 9.2;
 // What a further parameter must gain to be worth naming; about 2·ln of the number of poses.
 constexpr double kPricePerParameter = 6;
 constexpr std::size_t kLongestSum = 3;
-constexpr std::size_t kRefined = 16;
+constexpr std::size_t kRivalsRefined = 16;
 
 struct Rival {
   std::size_t candidate = 0;
@@ -115,7 +115,8 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
   std::vector<Rival> refined;
   for (const Rival& rival : ranked) {
     // The first order may understate a nonlinear rival, but not by this much.
-    if (refined.size() == kRefined || rival.gain < 0.5 * found_gain - kIndistinguishable) break;
+    if (refined.size() == kRivalsRefined || rival.gain < 0.5 * found_gain - kIndistinguishable)
+      break;
     if (usable(list.candidates[rival.candidate])) refined.push_back(rival);
   }
   std::vector<EnlargedFit> fits(refined.size());

@@ -16,7 +16,7 @@ namespace plumbline {
 namespace {
 
 /// By how much what takes another's place must be cheaper, in χ².
-constexpr double kClearly = 2;
+constexpr double kWorthExchanging = 2;
 
 /// Sum of squares of a fit. What a candidate makes of the first visit is a guess, which counts
 /// neither for it nor for what it would replace.
@@ -80,7 +80,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     if (!with.determined) continue;
     const double cost = chi2_beside(model, candidate, with) + model.price_in(with, index);
     const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
-    if (!(cost < now - kClearly)) continue;
+    if (!(cost < now - kWorthExchanging)) continue;
     const double p = model.p_of(candidate, model.log_p_of(index, without, with, gains.dof(index)));
     if (p <= model.false_alarm(candidate)) exchanges.push_back({index, p, with.parameters});
   }
@@ -166,7 +166,7 @@ std::vector<SearchModel::Entry> one_kind_for(const SearchModel& model,
   std::vector<SearchModel::Entry> best;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return best;
-  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kClearly;
+  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kWorthExchanging;
   const CandidateGains gains(responses, without);
   for (const Kind& kind : kinds_on_axes(model, gains)) {
     constexpr double kMayGain = 1.5;  // more than to first order
@@ -296,7 +296,7 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
   const std::size_t most = subset.size() + 2;
   std::vector<SearchModel::Entry> names;
   std::size_t worth = 0;
-  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kClearly, price = 0;
+  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kWorthExchanging, price = 0;
   EnlargedFit fit = model.fit_without(subset);
   while (fit.determined && names.size() < most) {
     std::optional<Next> next =
@@ -333,7 +333,7 @@ std::vector<SearchModel::Entry> parts_with_names(const SearchModel& model,
     fit = std::move(with);
   }
   const double now = model.stage().fit.chi2 + model.price_of({effect});
-  if (parts.empty() || !(fit.chi2 + cost < now - kClearly)) return {};
+  if (parts.empty() || !(fit.chi2 + cost < now - kWorthExchanging)) return {};
   const double log_p = log_chi_squared_tail(
       without.chi2 - fit.chi2,
       static_cast<double>(fit.parameters.free_count() - without.parameters.free_count()));
@@ -386,7 +386,7 @@ bool exchange_slow(SearchModel& model, std::size_t k) {
   };
   const double now = cost(model.stage().fit.parameters, model.index(k));
   const double then = cost(found->model, found->candidate);
-  return then < now - kClearly &&
+  return then < now - kWorthExchanging &&
          model.exchange({k}, {found->candidate, found->p_value, found->model});
 }
 

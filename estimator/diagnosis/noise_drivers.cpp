@@ -14,8 +14,8 @@ namespace plumbline {
 namespace {
 
 constexpr std::size_t kFewestReadings = 16;
-constexpr double kFalseAlarm = 1e-4;
-constexpr double kMatters = 1.16;  // ratio of standard deviations
+constexpr double kDriverFalseAlarm = 1e-4;
+constexpr double kLeastChange = 1.16;  // ratio of standard deviations
 constexpr const char* kNoise = "noise, ";
 
 /// ψ and ψ' for x of more than a few (Abramowitz & Stegun 6.3.18, 6.4.12).
@@ -164,7 +164,7 @@ std::optional<NoiseDriver> within_dwells(const Scatter& scatter, std::size_t axi
   found.ratio = std::sqrt(scatter.early_V2 / scatter.late_V2);
   found.u_ratio = 0.5 * u_V2 / std::sqrt(scatter.early_V2 * scatter.late_V2);
   const double change = std::max(found.ratio, 1 / found.ratio);
-  if (!(found.p_value < kFalseAlarm) || change < kMatters) return {};
+  if (!(found.p_value < kDriverFalseAlarm) || change < kLeastChange) return {};
   found.heldout_gain = std::max(0.0, 1 - 1 / square);
   constexpr double kQuarter = 0.25;
   found.excess_V2 =
@@ -202,7 +202,7 @@ std::optional<NoiseDriver> from_visit_to_visit(const Scatter& scatter,
   const double least = fit.fitted.minCoeff();
   const double log_ratio = 0.5 * (fit.fitted.maxCoeff() - least);
   found.ratio = std::exp(log_ratio);
-  if (!(found.p_value < kFalseAlarm) || found.ratio < kMatters) return {};
+  if (!(found.p_value < kDriverFalseAlarm) || found.ratio < kLeastChange) return {};
   const double scale = std::max(1.0, fit.square_left / static_cast<double>(n));
   found.u_ratio = found.ratio * log_ratio * std::sqrt(scale / (without - fit.square_left));
   double power_without = 0, power_with = 0;

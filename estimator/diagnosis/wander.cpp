@@ -64,8 +64,8 @@ double gain_of_other_half(const NoiseProcesses& processes, const NoiseModel& rec
 
 std::optional<NoiseDriver> wander(const SearchInput& input, std::size_t axis,
                                   const Eigen::VectorXd& start, const Left& left) {
-  constexpr double kFalseAlarm = 1e-6;
-  constexpr double kMatters = 1.5;  // ratio of standard deviations
+  constexpr double kClearP = 1e-6;
+  constexpr double kLeastRatio = 1.5;  // of standard deviations
   const NoiseModel& record = input.noise[axis];
   const NoisePool pool(input.processes, record, left.own_V2);
   const auto each = pool.contradiction(pool.pool(left.residual_V, left.design, &start),
@@ -77,13 +77,13 @@ std::optional<NoiseDriver> wander(const SearchInput& input, std::size_t axis,
   driver.at_random = true;
   driver.p_value = p_of_search(log_p, kAxisCount);
   driver.sigmas = sigmas_of(log_p);
-  if (!(driver.p_value < kFalseAlarm)) return {};
+  if (!(driver.p_value < kClearP)) return {};
   const auto left_by = [&](const Eigen::VectorXd& power) {
     const Eigen::MatrixXd V = pool.covariance(power);
     return V.trace() - left.design.cwiseProduct(V * left.design).sum();
   };
   driver.ratio = std::sqrt(left_by(each->power_of_run) / left_by(each->power_of_record));
-  if (!(driver.ratio > kMatters)) return {};
+  if (!(driver.ratio > kLeastRatio)) return {};
   driver.u_ratio = driver.ratio * std::log(driver.ratio) / std::sqrt(each->deviance);
   driver.heldout_gain = gain_of_other_half(input.processes, record, *each, left);
   if (!(driver.heldout_gain > 0)) return {};

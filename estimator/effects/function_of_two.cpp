@@ -8,7 +8,8 @@
 namespace plumbline {
 namespace {
 
-constexpr int kHighest = 6;  // harmonic: what is finer has too many companions to be told from them
+constexpr int kHighestHarmonic =
+    6;  // harmonic: what is finer has too many companions to be told from them
 
 /// From −1 to 1 over a range.
 double position(double value, double low, double high) {
@@ -35,7 +36,7 @@ class LineTimesHarmonic final : public DrivenTerm {
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
     if (!angle_->varies()) return starts;
-    for (int n = 1; n <= kHighest; ++n)
+    for (int n = 1; n <= kHighestHarmonic; ++n)
       starts.push_back({{low, high, static_cast<double>(n), size, size, size, size}});
     return starts;
   }
@@ -107,8 +108,8 @@ class HarmonicTimesHarmonic final : public DrivenTerm {
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
     if (!other_->varies()) return starts;
-    for (int n = 1; n <= kHighest; ++n)
-      for (int m = 1; m <= kHighest; ++m)
+    for (int n = 1; n <= kHighestHarmonic; ++n)
+      for (int m = 1; m <= kHighestHarmonic; ++m)
         starts.push_back(
             {{static_cast<double>(n), static_cast<double>(m), size, size, size, size}});
     return starts;

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Index;
 
 constexpr Index kAxes = static_cast<Index>(kAxisCount);
-constexpr Index kDrifts =
+constexpr Index kDriftStates =
     2 * kAxes;  ///< flicker and random walk of each axis, after the parameters
 
 /// What an axis's drifts do between visits.
@@ -35,7 +35,7 @@ class Pass {
  public:
   Pass(const PerAxis<Drift>& drifts, const Eigen::VectorXd& prior_sd) : drifts_(drifts) {
     parameters_ = prior_sd.size();
-    x_ = Eigen::VectorXd::Zero(parameters_ + kDrifts);
+    x_ = Eigen::VectorXd::Zero(parameters_ + kDriftStates);
     Eigen::VectorXd variance(x_.size());
     variance.head(parameters_) = prior_sd.cwiseAbs2();
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
