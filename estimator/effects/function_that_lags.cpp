@@ -55,44 +55,61 @@ class Lag : public DrivenTerm {
 
 class PlayLag final : public Lag {
  public:
-  PlayLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 1) {}
+  PlayLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 2) {}
 
   std::vector<ParameterInfo> parameters() const override {
     return {{"width", variable().unit(), ParameterRole::shape},
+            {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
     for (const double share : effect::geometric(0.01, 0.64, 7))
-      if (goes_to_and_fro(axis, share * (high - low)))
-        starts.push_back({{share * (high - low), target().typical_size()}});
+      if (const double width = share * (high - low); shows(axis, width, kMiddle))
+        starts.push_back({{width, kMiddle, target().typical_size()}});
     return starts;
   }
   // Wherever a visit begins to draw or ceases to, the fit may stop.
-  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t axis,
                                  const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
     for (const double off : effect::geometric(0.004, 0.12, 6))
       for (const double ratio : {1 - off, 1 + off})
-        others.push_back({{ratio * found.p[0], found.p[1]}});
+        others.push_back({{ratio * found.p[0], found.p[1], found.p[2]}});
+    for (const double start : {-1.0, -0.5, 0.5, 1.0})
+      for (const double ratio : {0.75, 1.0})
+        if (shows(axis, ratio * found.p[0], start))
+          others.push_back({{ratio * found.p[0], start, found.p[2]}});
     return others;
   }
 
  private:
+  static constexpr double kMiddle = 0;
+
   std::string function() const override { return "lag behind a play"; }
-  /// Drawn along in one direction only, the lag is a function of the driver itself.
-  bool goes_to_and_fro(std::size_t axis, double width) const {
+  /// What came before the first visit drew the follower to one end of the play (−1: the lower) or
+  /// left it between them.
+  static double at_start(double driver, double half, double start) {
+    return driver + half * std::clamp(start, -1.0, 1.0);
+  }
+  /// While the driver goes one way only, the lag is a function of it: it must have come back after
+  /// it drew. What starts elsewhere is told from what starts in the middle, with another width,
+  /// only when it was drawn both ways.
+  bool shows(std::size_t axis, double width, double start) const {
+    constexpr double kBack = 0.1;  // of the width
     const std::vector<double>& driver = variable().value[axis];
     const double half = 0.5 * width;
-    bool up = false, down = false;
-    double follower = driver.front();
+    bool up = false, down = false, back = false;
+    double follower = at_start(driver.front(), half, start);
     for (const double value : driver) {
-      up |= value - half > follower;
-      down |= value + half < follower;
+      const double off = value - follower;
+      up |= off > half;
+      down |= off < -half;
+      back |= (up && off < half - kBack * width) || (down && off > kBack * width - half);
       follower = std::clamp(follower, value - half, value + half);
     }
-    return up && down;
+    return start == kMiddle ? back : up && down;
   }
   std::vector<double> course(std::size_t axis, const double* shape) const override {
     const std::vector<double>& driver = variable().value[axis];
@@ -100,7 +117,7 @@ class PlayLag final : public Lag {
     std::vector<double> lag(driver.size());
     double follower = 0;
     for (std::size_t k = 0; k < driver.size(); ++k) {
-      if (variable().way_begins(k)) follower = driver[k];
+      if (variable().way_begins(k)) follower = at_start(driver[k], half, shape[1]);
       follower = std::clamp(follower, driver[k] - half, driver[k] + half);
       lag[k] = follower - driver[k];
     }
