@@ -390,6 +390,22 @@ Eigen::MatrixXd CandidateGains::of(const Eigen::MatrixXd& whitened) const {
   return gain;
 }
 
+Eigen::VectorXd CandidateGains::of_residual_as_they_stand() const {
+  Eigen::VectorXd gain(std::ssize(transform_));
+  for (std::size_t c = 0; c < transform_.size(); ++c) {
+    const auto& [g, first, count] = responses_.place[c];
+    const CandidateResponses::Group& group = responses_.groups[g];
+    CandidateResponses::Group whole{
+        group.first_row, group.means.middleCols(first, count).rowwise().sum(),
+        group.first_dwell_row, group.dwells.middleCols(first, count).rowwise().sum()};
+    const double seen = whole.products(residual_).value();
+    const double square = whole.means.squaredNorm() + whole.dwells.squaredNorm() -
+                          whole.products(model_basis_).squaredNorm();
+    gain(static_cast<Eigen::Index>(c)) = 2 * seen - square;
+  }
+  return gain;
+}
+
 EnlargedParameters CandidateGains::linear_start(std::size_t place,
                                                 const Candidate& candidate) const {
   const auto& [g, first, count] = responses_.place[place];

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <optional>
 #include <vector>
@@ -13,21 +14,40 @@ namespace plumbline {
 
 namespace {
 
-/// Those that gain most beside a fit to first order, best first.
+bool has_amplitude(const Effect& effect) {
+  const auto infos = effect.parameters();
+  return std::any_of(infos.begin(), infos.end(), [](const ParameterInfo& info) {
+    return info.role == ParameterRole::amplitude;
+  });
+}
+
+/// Of one effect those that gain most beside a fit to first order, best first. Without an amplitude
+/// none makes up for being the wrong one: then one of each kind, which the first parameter tells.
 std::vector<Candidate> likeliest(const SearchModel& model, const CandidateList& list,
                                  const EnlargedFit& fit) {
-  constexpr std::size_t kFew = 8;
+  constexpr std::size_t kFew = 8, kMostKinds = 12;
+  constexpr double kSameKind = 0.02;
   if (list.candidates.size() <= kFew) return list.candidates;
   const CandidateResponses beside =
       candidate_responses(model.input().log, list, model.stage().whitening, fit.parameters);
-  const Eigen::VectorXd gains = CandidateGains(beside, fit).of_residual();
+  const CandidateGains gains_of(beside, fit);
+  const bool free_size = has_amplitude(*list.candidates.front().effect);
+  const Eigen::VectorXd gains =
+      free_size ? gains_of.of_residual() : gains_of.of_residual_as_they_stand();
   std::vector<std::size_t> order(list.candidates.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](std::size_t k, std::size_t l) {
     return gains(static_cast<Eigen::Index>(k)) > gains(static_cast<Eigen::Index>(l));
   });
   std::vector<Candidate> few;
-  for (std::size_t k = 0; k < kFew; ++k) few.push_back(list.candidates[order[k]]);
+  for (const std::size_t k : order) {
+    const Candidate& next = list.candidates[k];
+    const bool is_known = !free_size && std::any_of(few.begin(), few.end(), [&](const auto& c) {
+      return std::abs(c.hypothesis.p[0] / next.hypothesis.p[0] - 1) < kSameKind;
+    });
+    if (!is_known) few.push_back(next);
+    if (few.size() == (free_size ? kFew : kMostKinds)) break;
+  }
   return few;
 }
 

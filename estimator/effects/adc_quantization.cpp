@@ -11,10 +11,10 @@ namespace {
 // Rounding to a step that the description of the run does not declare. How far the noise of a
 // reading rounds the stairs off is estimated with it: readings that hardly change say little of it.
 //
-// A coarser step than the declared one shows in the codes. A finer one does not: what is rounded
-// twice has every code, but the edges between them lie at edges of the finer lattice, up to half
-// of its step away. From code to code that goes up and down as a wave or a saw tooth, and is looked
-// for where one was found.
+// A coarser step than the declared one shows in the codes, unless it is little coarser and few
+// codes were visited. A finer one does not: what is rounded twice has every code, but the edges
+// between them lie at edges of the finer lattice, up to half of its step away. From code to code
+// that goes up and down as a wave or a saw tooth, and is looked for where one was found.
 class Quantization final : public Effect {
  public:
   std::string id() const override { return "adc.quantization"; }
@@ -29,9 +29,9 @@ class Quantization final : public Effect {
                             std::size_t k) const override {
     if (k != 0) return 0;
     if (log.codes[axis].coarser_lattice) return log.codes[axis].coarser_lattice->u_step_V();
-    if (!is_finer(log, p[0])) return 0;
+    if (!log.adc || !shows_other_step(log, axis)) return 0;
     // Rectangular between the neighbours that were looked at.
-    return kApart * p[0] * p[0] / (log.highest_V[axis] - log.lowest_V[axis]) / std::numbers::sqrt3;
+    return std::abs(stretched(log, axis, p[0], kApart) - p[0]) / std::numbers::sqrt3;
   }
   // Against a declared step the codes prove a coarser one; without it they only suggest one.
   bool certain(const VisitLog& log, std::size_t axis) const override {
@@ -40,7 +40,7 @@ class Quantization final : public Effect {
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     // Of a finer step nothing is known: half the declared one, with an edge at every edge between
     // two codes, changes nothing.
-    if (shows_finer_step(log, axis)) {
+    if (shows_other_step(log, axis)) {
       const double declared_V = log.adc->lsb_V();
       return {{{0.5 * declared_V, log.adc->min_V + 0.25 * declared_V, log.input_sd_V[axis]}}};
     }
@@ -61,7 +61,7 @@ class Quantization final : public Effect {
       away.push_back({p[0] + step_V, p[1] + origin_V, p[2]});
     return away;
   }
-  // Other lattices that the codes allow, or other finer steps of which the waves look alike.
+  // Other lattices that the codes allow, or what lies between those that were looked at.
   std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
                                  const Hypothesis& found) const override {
     if (const auto& lattice = log.codes[axis].coarser_lattice) {
@@ -74,18 +74,20 @@ class Quantization final : public Effect {
                 lattice->origin_V + a * first.origin_V + b * second.origin_V, found.p[2]}});
       return others;
     }
-    if (!shows_finer_step(log, axis)) return {};
-    const double turns = log.adc->lsb_V() / found.p[0];  // from one edge to the next
-    const double part = std::abs(std::remainder(turns, 1));
-    return part > 0 ? finer_steps(log, axis, log.adc->lsb_V() / part, 0)
-                    : std::vector<Hypothesis>{};
+    if (!shows_other_step(log, axis)) return {};
+    std::vector<Hypothesis> others;
+    for (int nearby = -kFiner; nearby <= kFiner; ++nearby)
+      for (int place = -kFiner; place <= kFiner; ++place)
+        others.push_back({{stretched(log, axis, found.p[0], kApart * nearby / (2 * kFiner)),
+                           found.p[1] + found.p[0] * place / (2 * kFiner * kPlaces), found.p[2]}});
+    return others;
   }
   std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const Effect& repeated,
                                  const std::vector<std::vector<double>>& instances) const override {
     if (!repeated.id().starts_with("unlisted:code_") || instances.size() != 1 ||
-        !shows_finer_step(log, axis) || !(is_wave(repeated) || is_saw_tooth(repeated)))
+        !shows_other_step(log, axis) || !(is_wave(repeated) || is_saw_tooth(repeated)))
       return {};  // another shape in the codes is something else
-    return finer_steps(log, axis, instances.front()[1], kNearby);
+    return steps_with_wave(log, axis, instances.front()[1], kNearby);
   }
   double term_g(const TermInput& input, const double* p) const override {
     if (is_finer(input.log, p[0])) return finer_term_g(input, p);
@@ -111,29 +113,32 @@ class Quantization final : public Effect {
   }
   /// Whether readings near an edge between two codes tell where it lies: there is noise that takes
   /// them over it, and not so much that all edges are one.
-  static bool shows_finer_step(const VisitLog& log, std::size_t axis) {
+  static bool shows_other_step(const VisitLog& log, std::size_t axis) {
     if (!log.adc || log.codes[axis].any()) return false;
     const double noise = log.input_sd_V[axis] / log.adc->lsb_V();
     return noise > kLeastOfStep && noise < kMostOfStep;
   }
+  /// A step of which the edges run through `turns` more by the other end of the readings.
+  static double stretched(const VisitLog& log, std::size_t axis, double lsb_V, double turns) {
+    return 1 / (1 / lsb_V + turns / (log.highest_V[axis] - log.lowest_V[axis]));
+  }
   /// Steps with a wave of this period from code to code: seen at the edges between codes only, one
   /// of 1/lsb = n/declared ± 1/period looks the same for every n.
-  static std::vector<Hypothesis> finer_steps(const VisitLog& log, std::size_t axis, double period_V,
-                                             int most_nearby) {
-    constexpr int kPlaces = 12;
+  static std::vector<Hypothesis> steps_with_wave(const VisitLog& log, std::size_t axis,
+                                                 double period_V, int most_nearby) {
     constexpr double kFinest = 0.2;  // of the declared step; finer ones shift no edge enough
+    constexpr double kCoarsest = 2;  // beyond, the codes show it
     const double declared_V = log.adc->lsb_V();
-    const double range_V = log.highest_V[axis] - log.lowest_V[axis];
+    // Places are counted from the middle of the readings, so that they do not depend on the step.
+    const double middle_V = 0.5 * (log.highest_V[axis] + log.lowest_V[axis]);
     std::vector<Hypothesis> found;
     for (int n = 0; n <= static_cast<int>(1 / kFinest); ++n) {
       for (const int side : {-1, 1}) {
+        const double per_V = n / declared_V + side / period_V;
+        if (!(per_V > 0)) continue;
         for (int nearby = -most_nearby; nearby <= most_nearby; ++nearby) {
-          const double wave_per_V = 1 / period_V + kApart * nearby / range_V;
-          const double lsb_V = 1 / (n / declared_V + side * wave_per_V);
-          if (!(lsb_V > kFinest * declared_V && lsb_V < declared_V)) continue;
-          // Counted from the middle of the readings, so that steps and places do not depend on each
-          // other.
-          const double middle_V = 0.5 * (log.highest_V[axis] + log.lowest_V[axis]);
+          const double lsb_V = stretched(log, axis, 1 / per_V, kApart * nearby);
+          if (!(lsb_V > kFinest * declared_V && lsb_V < kCoarsest * declared_V)) continue;
           for (int place = 0; place < kPlaces; ++place)
             found.push_back({{lsb_V, middle_V + lsb_V * place / kPlaces, log.input_sd_V[axis]}});
         }
@@ -165,7 +170,8 @@ class Quantization final : public Effect {
     return more_V / std::max(slope, kFlattest) / input.K_V_per_g;
   }
 
-  static constexpr int kNearby = 5;
+  static constexpr int kNearby = 5, kPlaces = 12;
+  static constexpr int kFiner = 3;        // to each side, half way to the next of those
   static constexpr double kApart = 0.06;  // of finer steps: turns of the phase over all readings
   static constexpr double kLeastOfStep = 0.1, kMostOfStep = 0.5;  // of noise, declared steps
 

@@ -139,6 +139,22 @@ TEST(DiagnosisStudy, AStepFinerThanTheDeclaredOneIsNoWave) {
   EXPECT_EQ(outcome.parameters_within, outcome.parameters) << outcome.found;
 }
 
+// Several finer steps, and some that are little coarser, make a wave of the same period. To first
+// order, with an amplitude that they do not have, a wrong one often seems the likelier.
+TEST(DiagnosisStudy, OfTheStepsThatMakeTheSameWaveTheTrueOneIsNamed) {
+  SetDesign design{.seed = 1190003,
+                   .effects = {"adc.quantization"},
+                   .order = sim::RecordOrder::raster,
+                   .noise = NoiseKind::white,
+                   .bits = 12,
+                   .samples_per_pose = 40,
+                   .static_s = 600};
+  for (const double size : {1, 3}) {
+    design.size = size;
+    expect_only_finding(run_set(design));
+  }
+}
+
 // Whole rings of poses go over an edge of the step and back: that passed for a train of pulses.
 TEST(DiagnosisStudy, SlowNoiseAtTheEdgesOfACoarseStepIsNoStructure) {
   const SetOutcome outcome = run_set({.seed = 900003,
