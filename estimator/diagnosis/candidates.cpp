@@ -395,7 +395,7 @@ Eigen::VectorXd CandidateGains::of_residual_as_they_stand() const {
   for (std::size_t c = 0; c < transform_.size(); ++c) {
     const auto& [g, first, count] = responses_.place[c];
     const CandidateResponses::Group& group = responses_.groups[g];
-    CandidateResponses::Group whole{
+    const CandidateResponses::Group whole{
         group.first_row, group.means.middleCols(first, count).rowwise().sum(),
         group.first_dwell_row, group.dwells.middleCols(first, count).rowwise().sum()};
     const double seen = whole.products(residual_).value();

@@ -29,7 +29,7 @@ class Quantization final : public Effect {
                             std::size_t k) const override {
     if (k != 0) return 0;
     if (log.codes[axis].coarser_lattice) return log.codes[axis].coarser_lattice->u_step_V();
-    if (!log.adc || !shows_other_step(log, axis)) return 0;
+    if (!shows_other_step(log, axis)) return 0;
     // Rectangular between the neighbours that were looked at.
     return std::abs(stretched(log, axis, p[0], kApart) - p[0]) / std::numbers::sqrt3;
   }
@@ -172,7 +172,7 @@ class Quantization final : public Effect {
 
   static constexpr int kNearby = 5, kPlaces = 12;
   static constexpr int kFiner = 3;        // to each side, half way to the next of those
-  static constexpr double kApart = 0.06;  // of finer steps: turns of the phase over all readings
+  static constexpr double kApart = 0.06;  // of steps: turns of the phase over all readings
   static constexpr double kLeastOfStep = 0.1, kMostOfStep = 0.5;  // of noise, declared steps
 
   /// What the declared converter makes of a point of the coarser lattice.

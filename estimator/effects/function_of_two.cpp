@@ -8,8 +8,8 @@
 namespace plumbline {
 namespace {
 
-constexpr int kHighestHarmonic =
-    6;  // harmonic: what is finer has too many companions to be told from them
+// What is finer has too many companions to be told from them.
+constexpr int kHighestHarmonic = 6;
 
 /// From −1 to 1 over a range.
 double position(double value, double low, double high) {
