@@ -14,6 +14,7 @@
 #include "app/command/command.h"
 #include "app/exit_code.h"
 #include "app/provenance.h"
+#include "estimator/linear_algebra.h"
 #include "rig/strict_toml.h"
 
 namespace plumbline::app {
@@ -99,6 +100,7 @@ int run(int argc, char** argv) {
 }  // namespace plumbline::app
 
 int main(int argc, char** argv) {
+  plumbline::start_with_kernels_for_processor(argv);
   // A full disk and a closed pipe are failures of a write, reported there, not a sudden death.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);

@@ -14,29 +14,44 @@
 #include "estimator/noise/identify.h"
 #include "estimator/noise/longest_stretch.h"
 #include "estimator/noise/periodic_noise.h"
+#include "estimator/noise/record_columns.h"
 #include "estimator/noise/reml.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
 
+/// `before` and `further` as one remark.
+std::string remarks(const std::string& before, const std::string& further) {
+  return before.empty() || further.empty() ? before + further : before + "; " + further;
+}
+
+/// Noise of the longest stretch of the record without a gap.
+NoiseModel identify_from_record(const SampleTable& table, const Stretch& stretch,
+                                std::size_t axis) {
+  const auto from = table.u_V[axis].begin() + static_cast<std::ptrdiff_t>(stretch.first);
+  std::vector<double> record(from, from + static_cast<std::ptrdiff_t>(stretch.count));
+  std::string followed;
+  for (const std::string& column : take_out_columns(record, table, stretch.first, stretch.step_s))
+    followed += (followed.empty() ? "" : " and ") + column;
+  NoiseModel noise = identify_noise(record, 1.0 / stretch.step_s);
+  if (stretch.gaps > 0)
+    noise.remark = remarks("the static record has " + std::to_string(stretch.gaps) +
+                               " gaps; its longest stretch of " + std::to_string(stretch.count) +
+                               " samples was used",
+                           noise.remark);
+  if (!followed.empty())
+    noise.remark =
+        remarks("what follows " + followed + " in the static record is not noise", noise.remark);
+  return noise;
+}
+
 /// stretch: of the static record, if there is one.
 NoiseModel identify(const CalibrationInput& input, const Stretch& stretch, std::size_t axis) {
-  NoiseModel noise;
   const SampleTable* record = input.static_record;
-  if (record != nullptr && record->size() > 1) {
-    const auto from = record->u_V[axis].begin() + static_cast<std::ptrdiff_t>(stretch.first);
-    noise = identify_noise({from, from + static_cast<std::ptrdiff_t>(stretch.count)},
-                           1.0 / stretch.step_s);
-    if (stretch.gaps > 0) {
-      noise.remark = "the static record has " + std::to_string(stretch.gaps) +
-                     " gaps; its longest stretch of " + std::to_string(stretch.count) +
-                     " samples was used" + (noise.remark.empty() ? "" : "; ") + noise.remark;
-    }
-  } else {
-    noise = identify_noise_from_bursts(input.run.samples, input.run.poses, axis);
-  }
-  return noise;
+  return record != nullptr && record->size() > 1
+             ? identify_from_record(*record, stretch, axis)
+             : identify_noise_from_bursts(input.run.samples, input.run.poses, axis);
 }
 
 PreparedRun prepared(const CalibrationInput& input) {

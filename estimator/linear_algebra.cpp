@@ -2,11 +2,16 @@
 
 #include <cblas.h>
 #include <malloc.h>
+#include <unistd.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <cassert>
+#include <cstdlib>
+#include <filesystem>
 #include <limits>
+#include <string_view>
+#include <system_error>
 
 // OpenBLAS holds LAPACK, too; its header is a package of its own.
 extern "C" void dpotri_(const char* triangle, const int* n, double* a, const int* lda, int* info);
@@ -34,6 +39,21 @@ const bool kThreadSafe = [] {
 }  // namespace
 
 bool linear_algebra_is_thread_safe() { return kThreadSafe; }
+
+void start_with_kernels_for_processor(char* const* arguments) {
+#ifdef __x86_64__
+  constexpr const char* kChoice = "OPENBLAS_CORETYPE";
+  if (std::string_view(openblas_get_corename()) != "Prescott" || std::getenv(kChoice) != nullptr ||
+      !__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma"))
+    return;
+  std::error_code none;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", none);
+  if (none || setenv(kChoice, "Haswell", 1) != 0) return;
+  execv(program.c_str(), arguments);
+#else
+  static_cast<void>(arguments);
+#endif
+}
 
 Eigen::MatrixXd inverse_from_factor(Eigen::MatrixXd lower) {
   const int n = static_cast<int>(lower.rows());

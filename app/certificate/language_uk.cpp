@@ -472,6 +472,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"polynomial of degree {}", "многочлен степеня {}"},
     {"harmonic series of order {}", "гармонічний ряд порядку {}"},
     {"the static record has {} gaps", "у записі в спокої є розриви ({})"},
+    {"what follows {} in the static record is not noise", "те, що в записі в спокої змінюється разом із {}, не є шумом"},
     {"its longest stretch of {} samples was used", "використано найдовшу ділянку, {} відліків"},
     {"in the run the line wanders, and is counted as noise", "у вимірюваннях лінія блукає й зарахована до шуму"},
     {"a periodic line at {} Hz, amplitude {}, is not noise", "періодична лінія на {} Hz з амплітудою {} не є шумом"},

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/linear_algebra.h"
+
 namespace {
 
 class TableReporter : public benchmark::ConsoleReporter {
@@ -51,6 +53,7 @@ class TableReporter : public benchmark::ConsoleReporter {
 }  // namespace
 
 int main(int argc, char** argv) {
+  plumbline::start_with_kernels_for_processor(argv);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   TableReporter reporter;

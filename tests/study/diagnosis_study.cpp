@@ -13,6 +13,7 @@
 #include <optional>
 #include <thread>
 
+#include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
 #include "tests/study/diagnosis.h"
 
@@ -239,6 +240,7 @@ int run(const Options& o, const std::vector<SetDesign>& designs) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  plumbline::start_with_kernels_for_processor(argv);
   Options o;
   o.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   CLI::App app{"Does the diagnosis name what is there, and nothing else?"};

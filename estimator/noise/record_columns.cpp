@@ -1,0 +1,150 @@
+#include "estimator/noise/record_columns.h"
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "estimator/linear_algebra.h"
+#include "estimator/noise/noise_processes.h"
+#include "estimator/noise/reml.h"
+
+namespace plumbline {
+namespace {
+
+constexpr Eigen::Index kFewestSpans = 40;
+constexpr Eigen::Index kMostSpans = 160;
+constexpr std::size_t kFewestSamples = 8;  // of a span
+// Of −2 ln L: one column in a thousand that has nothing to do with the record.
+constexpr double kClearly = 11;
+
+/// A column at the record's samples, about its mean there.
+struct Column {
+  std::string name;
+  Eigen::VectorXd value;
+  Eigen::VectorXd mean;  ///< of each span
+};
+
+/// Spans of equal length that cover the record but for a rest of less than one.
+struct Spans {
+  Eigen::Index count = 0;
+  Eigen::Index samples = 0;  ///< of each
+  Eigen::VectorXd means(const Eigen::VectorXd& of) const {
+    return of.head(count * samples).reshaped(samples, count).colwise().mean();
+  }
+};
+
+/// Those that change in the record.
+std::vector<Column> columns_of(const SampleTable& table, std::size_t first, Eigen::Index count,
+                               const Spans& spans) {
+  std::vector<Column> columns;
+  const auto add = [&](const std::string& name, const std::vector<double>& values) {
+    if (values.empty()) return;
+    Eigen::VectorXd value =
+        Eigen::VectorXd::Map(values.data() + static_cast<std::ptrdiff_t>(first), count);
+    value.array() -= value.mean();
+    if (!value.allFinite()) return;
+    Eigen::VectorXd mean = spans.means(value);
+    if (mean.maxCoeff() > mean.minCoeff())
+      columns.push_back({name, std::move(value), std::move(mean)});
+  };
+  add("temp_C", table.temp_C);
+  for (const Covariate& covariate : table.covariates) add(covariate.name, covariate.value);
+  return columns;
+}
+
+/// The means as noise about `design`.
+struct Explained {
+  double deviance = 0;  ///< −2 ln L
+  Eigen::VectorXd coefficients;
+};
+Explained explained(const NoisePool& pool, const Eigen::VectorXd& mean,
+                    const Eigen::MatrixXd& design, const Eigen::VectorXd* start,
+                    Eigen::VectorXd& power) {
+  const PooledNoise noise = pool.pool(mean, design, start);
+  power = noise.power;
+  const Eigen::LLT<Eigen::MatrixXd> factor(noise.covariance);
+  const Eigen::MatrixXd white_design = factor.matrixL().solve(design);
+  const Eigen::VectorXd white_mean = factor.matrixL().solve(mean);
+  return {noise.likelihood_deviance, white_design.colPivHouseholderQr().solve(white_mean)};
+}
+
+/// Of −2 ln L in white noise, by which a column is looked at more closely: slow noise as well as
+/// what follows the column is much more than that.
+bool is_worth_a_look(const Eigen::MatrixXd& design, const Eigen::VectorXd& mean,
+                     const Eigen::VectorXd& column) {
+  const Eigen::VectorXd left = mean - design * design.colPivHouseholderQr().solve(mean);
+  const Eigen::VectorXd other = column - design * design.colPivHouseholderQr().solve(column);
+  const double share =
+      left.dot(other) * left.dot(other) / (left.squaredNorm() * other.squaredNorm());
+  return -static_cast<double>(mean.size()) * std::log1p(-std::min(share, 1.0)) > kClearly;
+}
+
+Eigen::MatrixXd with_column(const Eigen::MatrixXd& design, const Eigen::VectorXd& column) {
+  Eigen::MatrixXd wider(design.rows(), design.cols() + 1);
+  wider << design, column;
+  return wider;
+}
+
+}  // namespace
+
+std::vector<std::string> take_out_columns(std::vector<double>& record, const SampleTable& table,
+                                          std::size_t first, double step_s) {
+  assert(first + record.size() <= table.size() && step_s > 0);
+  Spans spans;
+  spans.samples = static_cast<Eigen::Index>(
+      std::max(kFewestSamples, record.size() / static_cast<std::size_t>(kMostSpans)));
+  spans.count = std::ssize(record) / spans.samples;
+  Eigen::Map<Eigen::VectorXd> u(record.data(), std::ssize(record));
+  if (spans.count < kFewestSpans || !u.allFinite()) return {};
+  // A record that stands on one code is no better known for what is taken out of it.
+  if ((u.tail(u.size() - 1).array() != u.head(u.size() - 1).array()).count() < spans.count)
+    return {};
+  std::vector<Column> columns = columns_of(table, first, u.size(), spans);
+  const Eigen::VectorXd mean = spans.means(u.array() - u.mean());
+  const double scatter = (mean.tail(spans.count - 1) - mean.head(spans.count - 1)).norm();
+  if (columns.empty() || !(scatter > 0)) return {};
+
+  std::vector<SampleWindow> windows;
+  for (Eigen::Index k = 0; k < spans.count; ++k)
+    windows.push_back({static_cast<double>(k * spans.samples) * step_s, step_s,
+                       static_cast<std::size_t>(spans.samples)});
+  NoiseModel white;  // to begin with
+  white.N.value =
+      scatter * std::sqrt(windows.front().duration_s() / 2 / static_cast<double>(spans.count - 1));
+  const NoiseProcesses processes = noise_processes(windows);
+  const NoisePool pool(processes, white, {});
+  Eigen::MatrixXd design = Eigen::VectorXd::Ones(spans.count);
+  std::vector<Column> followed;
+  Eigen::VectorXd power;
+  std::optional<Explained> so_far;
+  while (!columns.empty()) {
+    std::optional<Explained> best;
+    auto which = columns.end();
+    for (auto column = columns.begin(); column != columns.end(); ++column) {
+      if (!is_worth_a_look(design, mean, column->mean)) continue;
+      if (!so_far) so_far = explained(pool, mean, design, nullptr, power);
+      Eigen::VectorXd with_it;
+      Explained found = explained(pool, mean, with_column(design, column->mean), &power, with_it);
+      if (best && best->deviance <= found.deviance) continue;
+      best = std::move(found);
+      which = column;
+    }
+    if (!best || best->deviance > so_far->deviance - kClearly) break;
+    design = with_column(design, which->mean);
+    followed.push_back(std::move(*which));
+    columns.erase(which);
+    so_far = std::move(best);
+  }
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < followed.size(); ++k) {
+    u -= so_far->coefficients(static_cast<Eigen::Index>(k) + 1) * followed[k].value;
+    names.push_back(followed[k].name);
+  }
+  return names;
+}
+
+}  // namespace plumbline
