@@ -458,6 +458,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"the way turned", "пройдений кут"},
     {"wave", "хвиля"},
     {"bell", "дзвоноподібна функція"},
+    {"one position", "одне положення"},
     {"window", "вікно"},
     {"train of pulses", "послідовність імпульсів"},
     {"jump that dies away", "стрибок, що згасає"},

@@ -89,6 +89,19 @@ void add_powers(const std::string& driver, const std::string& of, const Eigen::V
   shapes.push_back({driver, "parabola" + of, std::move(both)});
 }
 
+/// From one of so many values on, the same number of visits between one and the next.
+void add_steps(const Driver& driver, const Eigen::VectorXd& values, Eigen::Index places,
+               std::vector<Shape>& shapes) {
+  std::vector<double> sorted(values.begin(), values.end());
+  std::sort(sorted.begin(), sorted.end());
+  const Eigen::Index n = values.size();
+  for (Eigen::Index k = 1; k < places; ++k) {
+    const double at = sorted[static_cast<std::size_t>(n * k / places)];
+    if (!(at > sorted.front())) continue;
+    shapes.push_back({driver.name, "step", (values.array() >= at).cast<double>().matrix()});
+  }
+}
+
 std::vector<Shape> shapes_for(const std::vector<Driver>& drivers, std::size_t axis) {
   std::vector<Shape> shapes;
   for (const Driver& driver : drivers) {
@@ -105,6 +118,10 @@ std::vector<Shape> shapes_for(const std::vector<Driver>& drivers, std::size_t ax
     if (driver.component == axis)
       add_powers(driver.name, " in its size", values.cwiseAbs(), true, shapes);
     add_powers(driver.name, of, values, driver.two_valued, shapes);
+    // Something that was switched on, of itself or by what was recorded.
+    constexpr Eigen::Index kInstants = 80, kLevels = 24;
+    if (driver.is_clock()) add_steps(driver, values, std::min(kInstants, values.size()), shapes);
+    if (driver.recorded) add_steps(driver, values, std::min(kLevels, values.size()), shapes);
   }
   return shapes;
 }

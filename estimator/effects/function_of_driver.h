@@ -57,6 +57,9 @@ std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, con
                                  double shortest = 0);
 /// Whether this is a wave(): its parameters are start, period and the two amplitudes.
 bool is_wave(const Effect& effect);
+/// Something at one of the positions of an angle and at no other, of those that were visited three
+/// times or more: a damaged division of the head.
+std::unique_ptr<SmoothTerm> one_position(DriverPointer angle, const Target& target);
 /// A bell of unknown middle and width: something that happened once and took a while, or one place
 /// of an angle.
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);

@@ -11,6 +11,43 @@
 namespace plumbline {
 namespace {
 
+/// Something at one of the positions that an angle takes, and nowhere else: a damaged division.
+class OnePosition final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"at", variable().unit(), ParameterRole::index},
+            {"width", variable().unit(), ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  /// Positions that are visited more than once: what happened once is no property of a place.
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr std::size_t kFewestVisits = 3;
+    constexpr double kSame = 1e-6;
+    std::vector<double> values = variable().value[0];
+    std::sort(values.begin(), values.end());
+    std::vector<double> places;
+    double width = effect::kTurn_rad;
+    for (std::size_t first = 0, k = 1; k <= values.size(); ++k) {
+      if (k < values.size() && values[k] - values[k - 1] < kSame) continue;
+      if (k < values.size()) width = std::min(width, values[k] - values[k - 1]);
+      if (k - first >= kFewestVisits) places.push_back(values[first]);
+      first = k;
+    }
+    std::vector<Hypothesis> starts;
+    if (places.size() < 3) return starts;
+    for (const double at : places) starts.push_back({{at, 0.5 * width, target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "one position"; }
+  double at(double value, const double* p) const override {
+    return std::abs(std::remainder(value - p[0], effect::kTurn_rad)) < 0.5 * p[1] ? p[2] : 0;
+  }
+};
+
 class Bell final : public DrivenTerm {
  public:
   using DrivenTerm::DrivenTerm;
@@ -246,6 +283,9 @@ class Step final : public DrivenTerm {
 
 }  // namespace
 
+std::unique_ptr<SmoothTerm> one_position(DriverPointer angle, const Target& target) {
+  return std::make_unique<OnePosition>(std::move(angle), target);
+}
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target) {
   return std::make_unique<Bell>(std::move(driver), target);
 }

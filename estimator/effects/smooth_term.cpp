@@ -216,6 +216,7 @@ class TermList {
   }
   void add_of_angle(const DriverPointer& angle) {
     add_polynomials_of_others(angle, {2, 3});
+    for (const Target& target : {kDelta, kH}) add(one_position(angle, target));
     for (const Target& target : {kBias, kDelta, kH}) {
       add(bell(angle, target));
       add(sector(angle, target));
@@ -228,6 +229,7 @@ class TermList {
     const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
     for (const Target& target : {kBias, kH}) add(wave(h, target, {2 * turns, turns, 8 * turns}));
     for (const Target& target : {kDelta, kH}) {
+      add(one_position(h, target));
       add(harmonic(h, target, 9));
       add_steps(h, target);
       add(bell(h, target));

@@ -53,7 +53,8 @@ PowersAllowance allowance_for_powers(const NoiseProcesses& processes, const Esti
 Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
                                const std::vector<PowersAllowance>& allowances) {
   constexpr double kFewest = 3;  // degrees of freedom; of fewer hardly anything is known
-  constexpr double kMost = 1;    // of C: an expansion to second order says nothing beyond
+  // Of C, more and less: an expansion to second order says nothing beyond.
+  constexpr double kMost = 1, kMostLess = 0.9;
   Eigen::MatrixXd M = Eigen::MatrixXd::Zero(C.rows(), C.cols());
   Eigen::VectorXd variance = Eigen::VectorXd::Zero(C.rows());
   for (const PowersAllowance& allowance : allowances) {
@@ -66,7 +67,8 @@ Eigen::MatrixXd with_allowance(const Eigen::MatrixXd& C,
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> relative(L.transpose() * M * L);
   const Eigen::MatrixXd axes = L * relative.eigenvectors();
   const Eigen::MatrixXd allowance =
-      axes * relative.eigenvalues().cwiseMin(kMost).asDiagonal() * axes.transpose();
+      axes * relative.eigenvalues().cwiseMin(kMost).cwiseMax(-kMostLess).asDiagonal() *
+      axes.transpose();
   const Eigen::VectorXd wider =
       (2 * C.diagonal().array().square() / variance.array().max(1e-300))
           .max(kFewest)

@@ -54,6 +54,17 @@ TEST(NoiseDrivers, NoiseThatEveryArrivalBringsAlong) {
                     "noise, first quarter against the rest", 2);
 }
 
+// In an order in which h rises with the time, a parabola of a_z came nearer than one of the time.
+TEST(NoiseDrivers, NoiseOfWhatWasSwitchedOn) {
+  SyntheticOptions options = fine_grid();
+  constexpr int kFirst = 70;  // arrival
+  options.noise_x = [arrivals = 0](const auto&, double since_s) mutable {
+    if (since_s == 0) ++arrivals;
+    return arrivals > kFirst ? 2 : 1;
+  };
+  expect_noise_of_x(calibrated(synthetic_run(4, kSixteenBits, options)), "t_s", "noise, step", 2);
+}
+
 // Poses with less noise say more: with all alike the parameters err by half as much again.
 TEST(NoiseDrivers, QuietPosesCountForMore) {
   SyntheticOptions options = fine_grid();

@@ -302,6 +302,18 @@ TEST(AllowanceForPowers, OnePowerScalesEverythingAndMovesNothing) {
   EXPECT_EQ(with_allowance(C, {nothing}), C) << "noise that is known needs none";
 }
 
+// What is hardly determined makes the expansion to second order as large as it likes.
+TEST(AllowanceForPowers, NeverMakesAVarianceNegative) {
+  const Eigen::Matrix3d C = Eigen::Vector3d(1, 1e6, 1e-6).asDiagonal();
+  for (const double factor : {-1e3, -1.0, 1e3}) {
+    const PowersAllowance allowance{factor * C.inverse(), Eigen::Vector3d::Zero()};
+    const Eigen::Vector3d ratio =
+        with_allowance(C, {allowance}).diagonal().cwiseQuotient(C.diagonal());
+    EXPECT_GT(ratio.minCoeff(), 0.05) << factor;
+    EXPECT_LT(ratio.maxCoeff(), 2.5) << factor;
+  }
+}
+
 TEST(AllowanceForPowers, SlowNoiseThatMayNotBeThereCountsAsFarAsItIsLikely) {
   const SmallRun run = make_run(1, 0);
   const NoiseProcesses processes = noise_processes(run.windows);

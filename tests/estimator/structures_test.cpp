@@ -161,6 +161,29 @@ TEST(Structure, AWheelThatIsOffOverPartOfATurnIsASector) {
   expect_only_structure(options, {"delta_deg", "geometry", "sector, added to delta"});
 }
 
+// As a bell too narrow for anything to tell its width from its height; their variances came out
+// negative.
+TEST(Structure, ADamagedDivisionIsOnePosition) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.delta_error_deg = [](double delta_deg, double) { return delta_deg == 120 ? 1.5 : 0.0; };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"delta_deg", "geometry", "one position, added to delta"});
+  ASSERT_EQ(found.parameters.size(), 3U);
+  EXPECT_NEAR(found.parameters[0].value, 120 * std::numbers::pi / 180, 1e-9);
+  EXPECT_NEAR(found.parameters[2].value, 1.5, 3 * found.parameters[2].u);
+  EXPECT_GT(found.parameters[2].u, 0);
+}
+
+// As a bell that reaches the rings beside it, and a step of the tilt where the head went there.
+TEST(Structure, ADamagedTiltIsOnePosition) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.h_error_deg = [](double, double h_deg) { return h_deg == 40 ? 2.0 : 0.0; };
+  expect_only_structure(options, {"h_deg", "geometry", "one position, added to h"});
+}
+
 // As one bias for each harmonic and axis. Every second position is off the other way.
 TEST(Structure, TheLastHarmonicThatThePositionsShowIsAnAngle) {
   SyntheticOptions options;
