@@ -162,10 +162,40 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   return whitened;
 }
 
+namespace {
+
+/// The whitened Jacobian with its columns brought to length 1.
+struct Tangent {
+  Eigen::VectorXd norms;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+};
+
+/// Of a fit at its parameters, which gets its Jacobian; nothing where that does not determine them.
+std::optional<Tangent> tangent_at(const VisitLog& log, const PoseWhitening& whitening,
+                                  Eigen::Index rows, EnlargedFit& fit) {
+  constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
+  fit.whitened_jacobian = whitening.apply(prediction_jacobian(log, fit.parameters));
+  Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
+  if (!(norms.minCoeff() > 0)) return {};
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
+                                                 norms.cwiseInverse().asDiagonal());
+  const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
+  if (!(diagonal.minCoeff() > kDetermined * diagonal.maxCoeff())) return {};
+  return Tangent{std::move(norms), std::move(qr)};
+}
+
+bool has_free_shapes(const EnlargedParameters& parameters) {
+  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
+                     [](const ActiveEffect& active) {
+                       return with_shapes_held(active).free_count() < active.free_count();
+                     });
+}
+
+}  // namespace
+
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start,
                          int most_iterations) {
-  constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
   // The last digits of a model that is far from the readings tell nothing: it is only compared.
   constexpr double kLastDigits = 1e-6, kShareOfExcess = 1e-5;
   const Eigen::Index rows =
@@ -179,17 +209,11 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   fit.whitened_residual = whitened_residual(start);
   fit.chi2 = fit.whitened_residual.squaredNorm();
   for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
-    fit.whitened_jacobian = whitening.apply(prediction_jacobian(log, fit.parameters));
-    const Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
-    fit.determined = norms.minCoeff() > 0;
-    if (!fit.determined) return fit;
-    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
-                                                         norms.cwiseInverse().asDiagonal());
-    const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
-    fit.determined = diagonal.minCoeff() > kDetermined * diagonal.maxCoeff();
-    if (!fit.determined) return fit;
-
-    const Eigen::VectorXd step = qr.solve(fit.whitened_residual.head(rows));
+    const std::optional<Tangent> tangent = tangent_at(log, whitening, rows, fit);
+    fit.determined = tangent.has_value();
+    if (!tangent) return fit;
+    const Eigen::VectorXd& norms = tangent->norms;
+    const Eigen::VectorXd step = tangent->qr.solve(fit.whitened_residual.head(rows));
     bool improved = false, refused = false;
     const auto try_step = [&](const Eigen::VectorXd& scaled_step, bool stopping_short) {
       EnlargedParameters trial = fit.parameters;
@@ -230,6 +254,11 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
       }
     }
     if (!improved) fit.converged = true;  // no direction leads down any more
+  }
+  // A shape may have come to where it does nothing: an edge between two readings.
+  if (has_free_shapes(fit.parameters) && !tangent_at(log, whitening, rows, fit)) {
+    fit.determined = false;
+    return fit;
   }
   fit.covariance = covariance_of(fit.whitened_jacobian.topRows(rows));
   fit.determined = keeps_sensitivities(fit.parameters, start, kLikelyChange) &&

@@ -36,8 +36,10 @@ UnlistedStructure expect_only_structure(const SyntheticOptions& options,
   EXPECT_EQ(found.driver, expected.driver);
   EXPECT_EQ(found.form, expected.form);
   EXPECT_EQ(found.shape, expected.shape);
-  for (std::size_t i = 0; i < kAxisCount; ++i)
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    EXPECT_GT(result.floor_pose_rms_mps2[i], 0);
     EXPECT_LT(result.after.heldout_pose_rms_mps2[i], 1.3 * result.floor_pose_rms_mps2[i]);
+  }
   return found;
 }
 
@@ -212,6 +214,20 @@ TEST(Structure, ATiltThatJumpsBetweenTwoRingsJumpsInH) {
   options.h_step_deg = 10;
   options.h_error_deg = [](double, double h_deg) { return h_deg > 45 ? 0.7 : 0.0; };
   expect_only_structure(options, {"h_deg", "geometry", "step, added to h"});
+}
+
+// Where its edge lies between two readings nothing tells how wide it is: uncertainties that were
+// those of the last trial before left an expected residual of zero.
+TEST(Structure, ATiltThatJumpsAtSomeInstantJumpsInTime) {
+  SyntheticOptions options;
+  options.random_order = true;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  for (const double at_s : {300.0, 410.0}) {
+    SCOPED_TRACE(at_s);
+    options.base_roll_rad = [=](double t_s) { return t_s > at_s ? 0.03 : 0.0; };
+    expect_only_structure(options, {"t_s", "geometry", "step, added to the base roll"});
+  }
 }
 
 // As a settling that takes for ever.
