@@ -7,11 +7,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <cassert>
+#include <climits>
 #include <cstdlib>
-#include <filesystem>
 #include <limits>
+#include <string>
 #include <string_view>
-#include <system_error>
 
 // OpenBLAS holds LAPACK, too; its header is a package of its own.
 extern "C" void dpotri_(const char* triangle, const int* n, double* a, const int* lda, int* info);
@@ -46,9 +46,11 @@ void start_with_kernels_for_processor(char* const* arguments) {
   if (std::string_view(openblas_get_corename()) != "Prescott" || std::getenv(kChoice) != nullptr ||
       !__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma"))
     return;
-  std::error_code none;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", none);
-  if (none || setenv(kChoice, "Haswell", 1) != 0) return;
+  // By its own name, under which it is looked for among the processes.
+  std::string program(PATH_MAX, '\0');
+  const ssize_t length = readlink("/proc/self/exe", program.data(), program.size());
+  if (length <= 0 || setenv(kChoice, "Haswell", 1) != 0) return;
+  program.resize(static_cast<std::size_t>(length));
   execv(program.c_str(), arguments);
 #else
   static_cast<void>(arguments);

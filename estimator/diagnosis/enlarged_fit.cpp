@@ -184,6 +184,25 @@ std::optional<Tangent> tangent_at(const VisitLog& log, const PoseWhitening& whit
   return Tangent{std::move(norms), std::move(qr)};
 }
 
+/// Whether the tangent says nothing of a size: by its uncertainty it might be many times what it
+/// is.
+bool leaves_a_size_open(const EnlargedFit& fit) {
+  constexpr double kMost = 10;
+  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
+    const ActiveEffect& active = fit.parameters.effects[e];
+    const auto infos = active.effect->parameters();
+    Eigen::Index row = fit.parameters.first_free(e);
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!active.free[k]) continue;
+      const double u = std::sqrt(fit.covariance(row, row));
+      ++row;
+      if (has_a_sign_to_keep(active, infos[k], k) && !(u < kMost * std::abs(active.p[k])))
+        return true;
+    }
+  }
+  return false;
+}
+
 bool has_free_shapes(const EnlargedParameters& parameters) {
   return std::any_of(parameters.effects.begin(), parameters.effects.end(),
                      [](const ActiveEffect& active) {
@@ -262,7 +281,8 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   }
   fit.covariance = covariance_of(fit.whitened_jacobian.topRows(rows));
   fit.determined = keeps_sensitivities(fit.parameters, start, kLikelyChange) &&
-                   !cancel_each_other(fit) && !leave_a_sensitivity_open(fit);
+                   !cancel_each_other(fit) && !leave_a_sensitivity_open(fit) &&
+                   !leaves_a_size_open(fit);
   return fit;
 }
 

@@ -122,7 +122,8 @@ class Effect {
   virtual bool guesses_at_start() const { return false; }
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&, std::size_t /*axis*/) const { return false; }
-  /// Standard uncertainty of index parameter `k`, where the data narrow the choice to a range.
+  /// Standard uncertainty of parameter `k` where that is not fitted but the data narrow the choice
+  /// to a range.
   virtual double choice_uncertainty(const VisitLog&, std::size_t /*axis*/,
                                     const std::vector<double>& /*p*/, std::size_t /*k*/) const {
     return 0;

@@ -272,6 +272,17 @@ class Step final : public DrivenTerm {
     return static_cast<std::size_t>(next - t_s.begin());
   }
 
+  /// A step that nothing moves between two values lies anywhere between them.
+  double choice_uncertainty(const VisitLog&, std::size_t axis, const std::vector<double>& p,
+                            std::size_t k) const override {
+    if (k != 0) return 0;
+    std::vector<double> values = variable().value[axis];
+    std::sort(values.begin(), values.end());
+    const auto next = std::upper_bound(values.begin(), values.end(), p[0]);
+    if (next == values.begin() || next == values.end()) return 0;
+    return (*next - *(next - 1)) / std::sqrt(12.0);
+  }
+
  private:
   std::string function() const override { return "step"; }
   double at(double value, const double* p) const override {
