@@ -21,18 +21,21 @@ constexpr std::size_t kFewestSamples = 8;  // of a span
 // Of −2 ln L: one column in a thousand that has nothing to do with the record.
 constexpr double kClearly = 11;
 
-/// A column at the record's samples, about its mean there.
+using Values = Eigen::Map<const Eigen::VectorXd>;
+
+/// A column at the record's samples.
 struct Column {
   std::string name;
-  Eigen::VectorXd value;
-  Eigen::VectorXd mean;  ///< of each span
+  const double* first = nullptr;
+  double level = 0;      ///< mean over the record
+  Eigen::VectorXd mean;  ///< of each span, about that
 };
 
 /// Spans of equal length that cover the record but for a rest of less than one.
 struct Spans {
   Eigen::Index count = 0;
   Eigen::Index samples = 0;  ///< of each
-  Eigen::VectorXd means(const Eigen::VectorXd& of) const {
+  Eigen::VectorXd means(const Values& of) const {
     return of.head(count * samples).reshaped(samples, count).colwise().mean();
   }
 };
@@ -43,13 +46,11 @@ std::vector<Column> columns_of(const SampleTable& table, std::size_t first, Eige
   std::vector<Column> columns;
   const auto add = [&](const std::string& name, const std::vector<double>& values) {
     if (values.empty()) return;
-    Eigen::VectorXd value =
-        Eigen::VectorXd::Map(values.data() + static_cast<std::ptrdiff_t>(first), count);
-    value.array() -= value.mean();
+    const Values value(values.data() + first, count);
     if (!value.allFinite()) return;
-    Eigen::VectorXd mean = spans.means(value);
-    if (mean.maxCoeff() > mean.minCoeff())
-      columns.push_back({name, std::move(value), std::move(mean)});
+    const double level = value.mean();
+    const Eigen::VectorXd mean = spans.means(value).array() - level;
+    if (mean.maxCoeff() > mean.minCoeff()) columns.push_back({name, value.data(), level, mean});
   };
   add("temp_C", table.temp_C);
   for (const Covariate& covariate : table.covariates) add(covariate.name, covariate.value);
@@ -104,7 +105,8 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   if ((u.tail(u.size() - 1).array() != u.head(u.size() - 1).array()).count() < spans.count)
     return {};
   std::vector<Column> columns = columns_of(table, first, u.size(), spans);
-  const Eigen::VectorXd mean = spans.means(u.array() - u.mean());
+  const Eigen::VectorXd mean =
+      spans.means(Values(record.data(), u.size())).array() - record.front();
   const double scatter = (mean.tail(spans.count - 1) - mean.head(spans.count - 1)).norm();
   if (columns.empty() || !(scatter > 0)) return {};
 
@@ -141,7 +143,8 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   }
   std::vector<std::string> names;
   for (std::size_t k = 0; k < followed.size(); ++k) {
-    u -= so_far->coefficients(static_cast<Eigen::Index>(k) + 1) * followed[k].value;
+    u.array() -= so_far->coefficients(static_cast<Eigen::Index>(k) + 1) *
+                 (Values(followed[k].first, u.size()).array() - followed[k].level);
     names.push_back(followed[k].name);
   }
   return names;
