@@ -227,6 +227,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   fit.parameters = start;
   fit.whitened_residual = whitened_residual(start);
   fit.chi2 = fit.whitened_residual.squaredNorm();
+  bool moved = true;  // since the tangent was taken
   for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
     const std::optional<Tangent> tangent = tangent_at(log, whitening, rows, fit);
     fit.determined = tangent.has_value();
@@ -273,9 +274,10 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
       }
     }
     if (!improved) fit.converged = true;  // no direction leads down any more
+    moved = improved;
   }
   // A shape may have come to where it does nothing: an edge between two readings.
-  if (has_free_shapes(fit.parameters) && !tangent_at(log, whitening, rows, fit)) {
+  if (moved && has_free_shapes(fit.parameters) && !tangent_at(log, whitening, rows, fit)) {
     fit.determined = false;
     return fit;
   }

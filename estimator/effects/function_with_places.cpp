@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <map>
 #include <set>
 #include <utility>
 #include <vector>
@@ -21,19 +23,16 @@ class OnePosition final : public DrivenTerm {
             {"width", variable().unit(), ParameterRole::index},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
-  /// Positions that are visited more than once: what happened once is no property of a place.
+  /// Positions that are visited several times: what happened once is no property of a place.
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr std::size_t kFewestVisits = 3;
-    constexpr double kSame = 1e-6;
-    std::vector<double> values = variable().value[0];
-    std::sort(values.begin(), values.end());
+    constexpr int kFewestVisits = 3;
+    std::map<double, int> visits;
+    for (const double value : variable().value[0]) ++visits[value];
     std::vector<double> places;
     double width = effect::kTurn_rad;
-    for (std::size_t first = 0, k = 1; k <= values.size(); ++k) {
-      if (k < values.size() && values[k] - values[k - 1] < kSame) continue;
-      if (k < values.size()) width = std::min(width, values[k] - values[k - 1]);
-      if (k - first >= kFewestVisits) places.push_back(values[first]);
-      first = k;
+    for (auto place = visits.begin(); place != visits.end(); ++place) {
+      if (place != visits.begin()) width = std::min(width, place->first - std::prev(place)->first);
+      if (place->second >= kFewestVisits) places.push_back(place->first);
     }
     std::vector<Hypothesis> starts;
     if (places.size() < 3) return starts;

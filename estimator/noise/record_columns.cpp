@@ -1,6 +1,6 @@
 #include "estimator/noise/record_columns.h"
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cassert>
@@ -8,7 +8,6 @@
 #include <optional>
 #include <utility>
 
-#include "estimator/linear_algebra.h"
 #include "estimator/noise/noise_processes.h"
 #include "estimator/noise/reml.h"
 
@@ -57,20 +56,13 @@ std::vector<Column> columns_of(const SampleTable& table, std::size_t first, Eige
   return columns;
 }
 
-/// The means as noise about `design`.
-struct Explained {
-  double deviance = 0;  ///< −2 ln L
-  Eigen::VectorXd coefficients;
-};
-Explained explained(const NoisePool& pool, const Eigen::VectorXd& mean,
-                    const Eigen::MatrixXd& design, const Eigen::VectorXd* start,
-                    Eigen::VectorXd& power) {
-  const PooledNoise noise = pool.pool(mean, design, start);
-  power = noise.power;
+/// Generalised least squares of the design in this noise.
+Eigen::VectorXd coefficients_in(const PooledNoise& noise, const Eigen::MatrixXd& design,
+                                const Eigen::VectorXd& mean) {
   const Eigen::LLT<Eigen::MatrixXd> factor(noise.covariance);
   const Eigen::MatrixXd white_design = factor.matrixL().solve(design);
   const Eigen::VectorXd white_mean = factor.matrixL().solve(mean);
-  return {noise.likelihood_deviance, white_design.colPivHouseholderQr().solve(white_mean)};
+  return white_design.colPivHouseholderQr().solve(white_mean);
 }
 
 /// Of −2 ln L in white noise, by which a column is looked at more closely: slow noise as well as
@@ -121,29 +113,29 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   const NoisePool pool(processes, white, {});
   Eigen::MatrixXd design = Eigen::VectorXd::Ones(spans.count);
   std::vector<Column> followed;
-  Eigen::VectorXd power;
-  std::optional<Explained> so_far;
+  std::optional<PooledNoise> so_far;
   while (!columns.empty()) {
-    std::optional<Explained> best;
+    std::optional<PooledNoise> best;
     auto which = columns.end();
     for (auto column = columns.begin(); column != columns.end(); ++column) {
       if (!is_worth_a_look(design, mean, column->mean)) continue;
-      if (!so_far) so_far = explained(pool, mean, design, nullptr, power);
-      Eigen::VectorXd with_it;
-      Explained found = explained(pool, mean, with_column(design, column->mean), &power, with_it);
-      if (best && best->deviance <= found.deviance) continue;
+      if (!so_far) so_far = pool.pool(mean, design);
+      PooledNoise found = pool.pool(mean, with_column(design, column->mean), &so_far->power);
+      if (best && best->likelihood_deviance <= found.likelihood_deviance) continue;
       best = std::move(found);
       which = column;
     }
-    if (!best || best->deviance > so_far->deviance - kClearly) break;
+    if (!best || best->likelihood_deviance > so_far->likelihood_deviance - kClearly) break;
     design = with_column(design, which->mean);
     followed.push_back(std::move(*which));
     columns.erase(which);
     so_far = std::move(best);
   }
   std::vector<std::string> names;
+  if (followed.empty()) return names;
+  const Eigen::VectorXd coefficients = coefficients_in(*so_far, design, mean);
   for (std::size_t k = 0; k < followed.size(); ++k) {
-    u.array() -= so_far->coefficients(static_cast<Eigen::Index>(k) + 1) *
+    u.array() -= coefficients(static_cast<Eigen::Index>(k) + 1) *
                  (Values(followed[k].first, u.size()).array() - followed[k].level);
     names.push_back(followed[k].name);
   }
