@@ -26,6 +26,16 @@ std::string right_aligned(const std::string& text, std::size_t width) {
   return columns >= width ? text : std::string(width - columns, ' ') + text;
 }
 
+/// Nothing where there are none.
+std::string outlying_readings_line(const PerAxis<std::size_t>& outlying) {
+  std::string text;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (outlying[axis] > 0)
+      text += fmt::format("{}{} of {}", text.empty() ? "" : ", ",
+                          counted(outlying[axis], "reading"), kAxisName[axis]);
+  return text.empty() ? text : "left out, far out of their pose: " + text + '\n';
+}
+
 std::string parameter_rows(const TriadEstimate& estimate) {
   std::string rows = "parameters, ± with k = 2:";
   for (const char* title : {"K_x mV/g", "K_y mV/g", "K_z mV/g", "U_0 mV"}) {
@@ -141,6 +151,7 @@ std::string summary(const RunDescription& description, const Calibration& calibr
                       ? ""
                       : fmt::format(", {} skipped", counted(calibration.skipped_rows, "bad row")),
                   calibration.noise[0].source);
+  text += outlying_readings_line(calibration.outlying_readings);
   text += parameter_rows(calibration.final.batch_ls);
   text += error_rows(calibration, verification);
   text += fmt::format("diagnosis: {}: {}\n", to_string(calibration.diagnosis.verdict),
@@ -186,6 +197,7 @@ std::string evaluation_summary(const Evaluation& evaluation, const std::optional
                     significant(limits->max_abs_error_mps2, 3));
   }
   text += ".\n";
+  text += outlying_readings_line(evaluation.outlying_readings);
   if (!evaluation.left_out.empty()) {
     text += fmt::format(
         "Not applied, as it belonged to the calibration run, this set lacks a column, or another "

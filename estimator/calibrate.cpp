@@ -16,33 +16,35 @@
 #include "estimator/noise/periodic_noise.h"
 #include "estimator/noise/record_columns.h"
 #include "estimator/noise/reml.h"
+#include "estimator/outlying_readings.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
-
-/// `before` and `further` as one remark.
-std::string remarks(const std::string& before, const std::string& further) {
-  return before.empty() || further.empty() ? before + further : before + "; " + further;
-}
 
 /// Noise of the longest stretch of the record without a gap.
 NoiseModel identify_from_record(const SampleTable& table, const Stretch& stretch,
                                 std::size_t axis) {
   const auto from = table.u_V[axis].begin() + static_cast<std::ptrdiff_t>(stretch.first);
   std::vector<double> record(from, from + static_cast<std::ptrdiff_t>(stretch.count));
+  const std::vector<OutlyingReading> outlying = outlying_readings(record);
+  replace(record, outlying);
   std::string followed;
   for (const std::string& column : take_out_columns(record, table, stretch.first, stretch.step_s))
     followed += (followed.empty() ? "" : " and ") + column;
   NoiseModel noise = identify_noise(record, 1.0 / stretch.step_s);
-  if (stretch.gaps > 0)
-    noise.remark = remarks("the static record has " + std::to_string(stretch.gaps) +
-                               " gaps; its longest stretch of " + std::to_string(stretch.count) +
-                               " samples was used",
-                           noise.remark);
+  std::string remark;
+  if (!outlying.empty())
+    add_remark(remark, std::to_string(outlying.size()) +
+                           " outlying readings of the static record were left out");
   if (!followed.empty())
-    noise.remark =
-        remarks("what follows " + followed + " in the static record is not noise", noise.remark);
+    add_remark(remark, "what follows " + followed + " in the static record is not noise");
+  if (stretch.gaps > 0)
+    add_remark(remark, "the static record has " + std::to_string(stretch.gaps) +
+                           " gaps; its longest stretch of " + std::to_string(stretch.count) +
+                           " samples was used");
+  if (!noise.remark.empty()) add_remark(remark, noise.remark);
+  noise.remark = std::move(remark);
   return noise;
 }
 
@@ -120,7 +122,9 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
   assert(given.run.has_angles && !given.run.poses.empty());
   RunDescription description = given.description;
   if (description.adc) description.adc = aligned_with(given.run.samples, *description.adc);
-  const CalibrationInput input{given.run, given.static_record, description};
+  MeasurementSet measured = given.run;
+  const PerAxis<std::size_t> outlying = replace_outlying(measured, description.adc);
+  const CalibrationInput input{measured, given.static_record, description};
   const PreparedRun run = prepared(input);
   InItsNoise decided = calibrate_in_likeliest(run, options);
   // Decided again only then: what follows a column does so while the record is taken, too, and
@@ -131,9 +135,10 @@ Calibration calibrate(const CalibrationInput& given, const CalibrationOptions& o
       records_show_smooth_noise(run.noise, run.windows)) {
     decided.further.smooth = true;
     Calibration smooth = calibrate_in_noise(decided.further, run, options);
-    if (is_better(smooth, decided.result)) return smooth;
+    if (is_better(smooth, decided.result)) decided.result = std::move(smooth);
   }
-  return decided.result;
+  decided.result.outlying_readings = outlying;
+  return std::move(decided.result);
 }
 
 }  // namespace plumbline

@@ -234,6 +234,7 @@ struct Calibration {
   std::size_t poses = 0;
   std::size_t samples = 0;
   std::size_t skipped_rows = 0;
+  PerAxis<std::size_t> outlying_readings{};  ///< left out (outlying_readings.h)
   std::vector<ColumnRange> ranges;  ///< of the recorded columns
   PerAxis<NoiseModel> noise;
   PerAxis<std::optional<QuantizationUse>> quantization;  ///< nothing: steps do not matter
@@ -268,6 +269,7 @@ struct EvaluationFigures {
 struct Evaluation {
   std::size_t poses = 0;
   std::size_t samples = 0;
+  PerAxis<std::size_t> outlying_readings{};  ///< left out
   EvaluationFigures before;                  ///< the 12 parameters alone
   EvaluationFigures after;                   ///< the certified model
   BetweenSets head = BetweenSets::anywhere;  ///< between the calibration run and this set

@@ -12,6 +12,7 @@
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/noise/chi_squared.h"
+#include "estimator/outlying_readings.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
@@ -84,10 +85,12 @@ CertifiedModel certified_model(const Calibration& calibration,
           .own_effects = own_effects};
 }
 
-Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& set,
+Evaluation evaluate(const CertifiedModel& model, const MeasurementSet& given,
                     const RunDescription& description, std::optional<BetweenSets> head) {
-  const std::vector<PoseMean> poses = pose_means(set);
   Evaluation result;
+  MeasurementSet set = given;
+  result.outlying_readings = replace_outlying(set, description.adc);
+  const std::vector<PoseMean> poses = pose_means(set);
   result.poses = poses.size();
   result.samples = set.samples.size();
   result.beyond = beyond(model.ranges, set.samples);

@@ -58,10 +58,16 @@ Told told_events(const std::vector<CertificateEvent>& events) {
 void add_history(const Composer& c) {
   c.add(Heading{c.tr("Data and events")});
   const std::size_t skipped = c.input.calibration.skipped_rows;
+  std::string outlying;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (const std::size_t count = c.input.calibration.outlying_readings[axis]; count > 0)
+      outlying += fmt::format("{}{}: {}", outlying.empty() ? "" : ", ", kAxisName[axis], count);
   Facts facts;
   facts.rows = {{c.tr("Program"), "plumbline " + program_version()},
                 {c.tr("Seed"), fmt::format("{}", c.input.provenance.seed)},
-                {c.tr("Rows skipped"), skipped == 0 ? c.tr("none") : fmt::format("{}", skipped)}};
+                {c.tr("Rows skipped"), skipped == 0 ? c.tr("none") : fmt::format("{}", skipped)},
+                {c.tr("Readings left out, far out of their pose"),
+                 outlying.empty() ? c.tr("none") : outlying}};
   for (const auto& [name, hash] : c.input.provenance.input_sha256) {
     const std::string file = std::filesystem::path(name).filename().string();
     facts.rows.push_back({c.tr("SHA-256 of {}", file), hash});

@@ -47,16 +47,26 @@ void CairoCanvas::polygon(const std::vector<Point>& points, const std::string& f
 void CairoCanvas::circle(Point centre, double radius, const std::string& fill,
                          const Stroke& stroke) {
   cairo_new_path(cairo_);
+  if (stroke.color.empty()) {
+    // A line without length and with round ends: of thousands of dots a circle each is most of a
+    // page.
+    if (fill.empty()) return;
+    cairo_move_to(cairo_, centre.x, centre.y);
+    cairo_close_path(cairo_);
+    cairo_save(cairo_);
+    set_stroke({.color = fill, .width = 2 * radius, .dash = {}});
+    cairo_set_line_cap(cairo_, CAIRO_LINE_CAP_ROUND);
+    cairo_stroke(cairo_);
+    cairo_restore(cairo_);
+    return;
+  }
   cairo_arc(cairo_, centre.x, centre.y, radius, 0, 2 * std::numbers::pi);
   if (!fill.empty()) {
     set_color(cairo_, fill);
     cairo_fill_preserve(cairo_);
   }
-  if (!stroke.color.empty()) {
-    set_stroke(stroke);
-    cairo_stroke(cairo_);
-  }
-  cairo_new_path(cairo_);
+  set_stroke(stroke);
+  cairo_stroke(cairo_);
 }
 
 void CairoCanvas::text(Point at, std::string_view text, const TextStyle& style) {

@@ -83,6 +83,8 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
            {{"poses", calibration.poses},
             {"samples", calibration.samples},
             {"skipped_rows", calibration.skipped_rows},
+            {"outlying_readings",
+             json_per_axis([&](std::size_t axis) { return calibration.outlying_readings[axis]; })},
             {"ranges", ranges_json(calibration.ranges)},
             {"axes", json_axis_names({0, 1, 2})},
             {"condition", json_number(calibration.observability.condition)}}},

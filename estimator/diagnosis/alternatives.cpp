@@ -72,12 +72,11 @@ std::optional<Alternative> field_of_room(const SearchInput& input, const Candida
     EnlargedParameters with = base;
     for (const Candidate& candidate : list.candidates) {
       if (candidate.effect != field->effect) continue;
-      Candidate axis = candidate;
+      std::vector<double> p = candidate.hypothesis.p;
       for (std::size_t k = 0; k < count; ++k)
-        if (only < count && k != only) axis.hypothesis.p[k] = 0;
-      const auto& p = axis.hypothesis.p;
+        if (only < count && k != only) p[k] = 0;
       if (std::any_of(p.begin(), p.end(), [](double value) { return value != 0; }))
-        with = with_effect(with, axis.active());
+        with = with_effect(with, candidate.with({std::move(p)}).active());
     }
     if (with.effects.size() == base.effects.size()) continue;
     EnlargedFit fit = fit_enlarged(input.log, result.observed, result.whitening, with);

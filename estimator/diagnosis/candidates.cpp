@@ -59,6 +59,32 @@ bool is_nothing_but_steps(const VisitLog& log, std::size_t axis) {
   return log.noise_in_coarser_steps(axis).value_or(kSoftest) < kSoftest;
 }
 
+/// Once per amplitude; an effect of shapes and indices alone once as it stands.
+std::vector<SingleAmplitude> single_amplitudes(const Candidate& candidate) {
+  const auto infos = candidate.effect->parameters();
+  const ActiveEffect active = candidate.active();
+  std::vector<SingleAmplitude> singles;
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    if (infos[k].role != ParameterRole::amplitude || active.p[k] == 0) continue;
+    ActiveEffect single = active;
+    for (std::size_t other = 0; other < infos.size(); ++other) {
+      if (other != k && infos[other].role == ParameterRole::amplitude) single.p[other] = 0;
+    }
+    singles.push_back({std::move(single), {}});
+  }
+  if (singles.empty()) singles.push_back({active, {}});
+  return singles;
+}
+
+/// Works out in advance what does not depend on a model.
+void prepare(const VisitLog& log, Candidate& candidate) {
+  std::vector<SingleAmplitude> singles = single_amplitudes(candidate);
+  for (SingleAmplitude& single : singles)
+    single.number =
+        candidate.effect->numbers_of_visits(log, candidate.axis, single.active.p.data());
+  candidate.singles = std::make_shared<const std::vector<SingleAmplitude>>(std::move(singles));
+}
+
 }  // namespace
 
 CandidateList all_candidates(const VisitLog& log,
@@ -86,6 +112,7 @@ CandidateList all_candidates(const VisitLog& log,
     list.owned.push_back(effect);
     add_candidates(list, log, *effect);
   }
+  parallel_for(list.candidates.size(), [&](std::size_t c) { prepare(log, list.candidates[c]); });
   return list;
 }
 
@@ -119,46 +146,36 @@ struct Baseline {
 };
 
 // Term of a sensor effect on its axis, V, n rows.
-void set_sensor_response(const Baseline& base, const ActiveEffect& active,
+void set_sensor_response(const Baseline& base, const SingleAmplitude& single,
                          Eigen::Ref<Eigen::VectorXd> change) {
+  const ActiveEffect& active = single.active;
   for (Eigen::Index k = 0; k < change.size(); ++k) {
     const TermInput& input = base.input(active.axis, k);
-    change(k) = input.K_V_per_g * active.effect->term_g(input, active.p.data());
+    const double term_g = single.number.empty()
+                              ? active.effect->term_g(input, active.p.data())
+                              : active.effect->term_of_number_g(input, single.number[input.visit]);
+    change(k) = input.K_V_per_g * term_g;
   }
 }
 
 // What a head effect changes on all axes, V, 3n rows. What it changes in the terms of sensor
 // effects that are in the model already is left to the refit.
-void add_head_response(const Baseline& base, const ActiveEffect& active,
+void add_head_response(const Baseline& base, const SingleAmplitude& single,
                        Eigen::Ref<Eigen::VectorXd> change) {
+  const Effect& effect = *single.active.effect;
   const auto n = static_cast<Eigen::Index>(base.head.size());
   for (Eigen::Index k = 0; k < n; ++k) {
     const auto visit = static_cast<std::size_t>(k);
     HeadGeometry head = base.head[visit];
-    active.effect->displace(base.log, visit, active.p.data(), head);
+    if (single.number.empty())
+      effect.displace(base.log, visit, single.active.p.data(), head);
+    else
+      effect.displace_by_number(base.log, visit, single.number[visit], head);
     if (head == base.head[visit]) continue;  // most candidates concern few visits
     const Eigen::Vector3d moved = specific_force_g(head, base.log.gamma) - base.a_g[visit];
     for (std::size_t i = 0; i < kAxisCount; ++i)
       change(static_cast<Eigen::Index>(i) * n + k) = base.model.twelve[i].head<3>().dot(moved);
   }
-}
-
-/// The candidate once per amplitude with the other amplitudes at zero; an effect of shapes and
-/// indices alone once as it stands.
-std::vector<ActiveEffect> single_amplitudes(const Candidate& candidate) {
-  const auto infos = candidate.effect->parameters();
-  const ActiveEffect active = candidate.active();
-  std::vector<ActiveEffect> singles;
-  for (std::size_t k = 0; k < infos.size(); ++k) {
-    if (infos[k].role != ParameterRole::amplitude || active.p[k] == 0) continue;
-    ActiveEffect single = active;
-    for (std::size_t other = 0; other < infos.size(); ++other) {
-      if (other != k && infos[other].role == ParameterRole::amplitude) single.p[other] = 0;
-    }
-    singles.push_back(std::move(single));
-  }
-  if (singles.empty()) singles.push_back(active);
-  return singles;
 }
 
 constexpr std::size_t kHead = 2 * kAxisCount;
@@ -233,13 +250,15 @@ CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateLis
                                          const EnlargedParameters& model) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   CandidateResponses responses;
-  std::array<std::vector<ActiveEffect>, kGroups> singles;
-  std::vector<std::vector<ActiveEffect>> own(list.candidates.size());
-  parallel_for(own.size(), [&](std::size_t c) { own[c] = single_amplitudes(list.candidates[c]); });
+  std::array<std::vector<const SingleAmplitude*>, kGroups> singles;
+  std::vector<std::vector<SingleAmplitude>> own(list.candidates.size());
   for (std::size_t c = 0; c < own.size(); ++c) {
-    const std::size_t group = group_of(list.candidates[c]);
-    responses.place.push_back({group, std::ssize(singles[group]), std::ssize(own[c])});
-    std::move(own[c].begin(), own[c].end(), std::back_inserter(singles[group]));
+    const Candidate& candidate = list.candidates[c];
+    if (!candidate.singles) own[c] = single_amplitudes(candidate);
+    const auto& of_candidate = candidate.singles ? *candidate.singles : own[c];
+    const std::size_t group = group_of(candidate);
+    responses.place.push_back({group, std::ssize(singles[group]), std::ssize(of_candidate)});
+    for (const SingleAmplitude& single : of_candidate) singles[group].push_back(&single);
   }
   for (std::size_t g = 0; g < kGroups; ++g) {
     CandidateResponses::Group& group = responses.groups[g];
@@ -260,13 +279,13 @@ CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateLis
     auto dwells = group.dwells.middleCols(first, count);
     if (is_head(g)) means.setZero();
     for (Eigen::Index j = 0; j < count; ++j) {
-      const ActiveEffect& single = singles[g][static_cast<std::size_t>(first + j)];
+      const SingleAmplitude& single = *singles[g][static_cast<std::size_t>(first + j)];
       if (is_head(g)) {
         add_head_response(base, single, means.col(j));
-        if (is_within_dwell(g)) set_head_dwell_response(base, single, dwells.col(j));
+        if (is_within_dwell(g)) set_head_dwell_response(base, single.active, dwells.col(j));
       } else {
         set_sensor_response(base, single, means.col(j));
-        if (is_within_dwell(g)) set_dwell_response(base, single, dwells.col(j));
+        if (is_within_dwell(g)) set_dwell_response(base, single.active, dwells.col(j));
       }
     }
   });

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/enlarged_fit.h"
@@ -14,6 +15,12 @@ namespace plumbline {
 /// much.
 inline constexpr double kHandicapOfUnnamed = 7;
 
+/// One amplitude of a hypothesis, the others at zero; of shapes and indices alone the hypothesis.
+struct SingleAmplitude {
+  ActiveEffect active;
+  std::vector<double> number;  ///< numbers_of_visits()
+};
+
 /// One hypothesis of one effect on one axis (or the head).
 struct Candidate {
   const Effect* effect = nullptr;
@@ -23,8 +30,17 @@ struct Candidate {
   double handicap = 0;     ///< log-probability by which it must beat those without
   /// Single readings of a coarse converter stray further than Gaussian noise does.
   bool of_one_coarse_reading = false;
+  /// Worked out in advance for a candidate that is looked at in many models.
+  std::shared_ptr<const std::vector<SingleAmplitude>> singles = {};
 
   bool has_name() const { return handicap == 0; }
+  /// The same effect with another hypothesis.
+  Candidate with(Hypothesis other) const {
+    Candidate candidate = *this;
+    candidate.hypothesis = std::move(other);
+    candidate.singles = nullptr;
+    return candidate;
+  }
   ActiveEffect active() const { return activate(*effect, axis, hypothesis); }
 };
 

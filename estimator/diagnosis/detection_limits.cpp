@@ -160,9 +160,9 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
     for (Size& size : sizes) {
       size.sort();
       for (const double value : size.next()) {
-        Candidate candidate = *size.first;
-        candidate.hypothesis.p.front() = value;
-        closer.candidates.push_back(std::move(candidate));
+        Hypothesis hypothesis = size.first->hypothesis;
+        hypothesis.p.front() = value;
+        closer.candidates.push_back(size.first->with(std::move(hypothesis)));
         owner.push_back(&size);
       }
     }

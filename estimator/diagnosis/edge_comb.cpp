@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "estimator/linear_algebra.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
@@ -62,6 +63,40 @@ EdgeComb refined(EdgeComb train, const std::vector<double>& at_s, const Eigen::V
   return train;
 }
 
+/// One for each width, the likeliest of those that were looked at.
+std::vector<EdgeComb> trains_of_period(const std::vector<double>& at_s, double period_s,
+                                       double distance_s, const Eigen::VectorXd& products,
+                                       const Eigen::MatrixXd& gram) {
+  const auto phases = std::min(kMostPhases, static_cast<int>(std::lround(period_s / distance_s)));
+  std::vector<Comb> combs;
+  std::vector<double> product;
+  for (int phase = 0; phase < phases; ++phase) {
+    combs.emplace_back(at_s, period_s, at_s.front() + period_s * phase / phases);
+    product.push_back(products(combs.back().steps).sum());
+  }
+  const auto wrapped = [&](int phase) { return static_cast<std::size_t>(phase % phases); };
+  std::vector<EdgeComb> trains;
+  // Wider pulses are narrow ones of the other sign beside another zero. Of one width the train
+  // with the largest product is the one to look at.
+  for (int width = 1; width <= phases / 2; ++width) {
+    int best_up = 0;
+    double largest = 0;
+    for (int up = 0; up < phases; ++up) {
+      const double difference = std::abs(product[wrapped(up)] - product[wrapped(up + width)]);
+      if (difference <= largest) continue;
+      largest = difference;
+      best_up = up;
+    }
+    EdgeComb train{.period_s = period_s,
+                   .first_up_s = at_s.front() + period_s * best_up / phases,
+                   .width_s = period_s * width / phases,
+                   .looks = static_cast<double>(phases)};
+    fit(train, combs[wrapped(best_up)], combs[wrapped(best_up + width)], products, gram);
+    trains.push_back(train);
+  }
+  return trains;
+}
+
 }  // namespace
 
 std::optional<EdgeComb> best_edge_comb(const std::vector<double>& at_s,
@@ -71,38 +106,19 @@ std::optional<EdgeComb> best_edge_comb(const std::vector<double>& at_s,
   if (std::ssize(at_s) < kFewestSteps) return std::nullopt;
   const double span_s = at_s.back() - at_s.front();
   const double distance_s = span_s / static_cast<double>(at_s.size() - 1);
-  std::vector<EdgeComb> trains;  // one for each period and width
-  double looks = 0;
   const double shortest_s = kShortestPeriod * distance_s, ratio = 1 + 2 * distance_s / span_s;
-  const auto periods = std::lround(std::log(span_s / 1.5 / shortest_s) / std::log(ratio));
-  for (long k = 0; k < periods; ++k) {
+  const auto periods =
+      std::max(0L, std::lround(std::log(span_s / 1.5 / shortest_s) / std::log(ratio)));
+  std::vector<std::vector<EdgeComb>> of_period(static_cast<std::size_t>(periods));
+  parallel_for(of_period.size(), [&](std::size_t k) {
     const double period_s = shortest_s * std::pow(ratio, static_cast<double>(k));
-    const auto phases = std::min(kMostPhases, static_cast<int>(std::lround(period_s / distance_s)));
-    std::vector<Comb> combs;
-    std::vector<double> product;
-    for (int phase = 0; phase < phases; ++phase) {
-      combs.emplace_back(at_s, period_s, at_s.front() + period_s * phase / phases);
-      product.push_back(products(combs.back().steps).sum());
-    }
-    const auto wrapped = [&](int phase) { return static_cast<std::size_t>(phase % phases); };
-    // Wider pulses are narrow ones of the other sign beside another zero. Of one width the train
-    // with the largest product is the one to look at.
-    for (int width = 1; width <= phases / 2; ++width) {
-      int best_up = 0;
-      double largest = 0;
-      for (int up = 0; up < phases; ++up) {
-        const double difference = std::abs(product[wrapped(up)] - product[wrapped(up + width)]);
-        if (difference <= largest) continue;
-        largest = difference;
-        best_up = up;
-      }
-      EdgeComb train{.period_s = period_s,
-                     .first_up_s = at_s.front() + period_s * best_up / phases,
-                     .width_s = period_s * width / phases};
-      fit(train, combs[wrapped(best_up)], combs[wrapped(best_up + width)], products, gram);
-      trains.push_back(train);
-      looks += phases;
-    }
+    of_period[k] = trains_of_period(at_s, period_s, distance_s, products, gram);
+  });
+  std::vector<EdgeComb> trains;
+  double looks = 0;
+  for (const std::vector<EdgeComb>& some : of_period) {
+    trains.insert(trains.end(), some.begin(), some.end());
+    for (const EdgeComb& train : some) looks += train.looks;
   }
   const auto better = [](const EdgeComb& a, const EdgeComb& b) { return a.gain > b.gain; };
   const auto few = std::min<std::ptrdiff_t>(kFewToRefine, std::ssize(trains));

@@ -203,13 +203,6 @@ bool leaves_a_size_open(const EnlargedFit& fit) {
   return false;
 }
 
-bool has_free_shapes(const EnlargedParameters& parameters) {
-  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
-                     [](const ActiveEffect& active) {
-                       return with_shapes_held(active).free_count() < active.free_count();
-                     });
-}
-
 }  // namespace
 
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
@@ -227,11 +220,12 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   fit.parameters = start;
   fit.whitened_residual = whitened_residual(start);
   fit.chi2 = fit.whitened_residual.squaredNorm();
-  bool moved = true;  // since the tangent was taken
+  EnlargedParameters tangent_of = start;
   for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
     const std::optional<Tangent> tangent = tangent_at(log, whitening, rows, fit);
     fit.determined = tangent.has_value();
     if (!tangent) return fit;
+    tangent_of = fit.parameters;
     const Eigen::VectorXd& norms = tangent->norms;
     const Eigen::VectorXd step = tangent->qr.solve(fit.whitened_residual.head(rows));
     bool improved = false, refused = false;
@@ -274,10 +268,9 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
       }
     }
     if (!improved) fit.converged = true;  // no direction leads down any more
-    moved = improved;
   }
   // A shape may have come to where it does nothing: an edge between two readings.
-  if (moved && has_free_shapes(fit.parameters) && !tangent_at(log, whitening, rows, fit)) {
+  if (shapes_differ(fit.parameters, tangent_of) && !tangent_at(log, whitening, rows, fit)) {
     fit.determined = false;
     return fit;
   }

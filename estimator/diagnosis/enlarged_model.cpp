@@ -87,6 +87,18 @@ double EnlargedParameters::mps2_per_V(std::size_t axis) const {
   return kStandardGravity_mps2 / twelve[axis](static_cast<Eigen::Index>(axis));
 }
 
+bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other) {
+  for (std::size_t e = 0; e < one.effects.size(); ++e) {
+    const ActiveEffect& active = one.effects[e];
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (active.free[k] && infos[k].role == ParameterRole::shape &&
+          std::abs(active.p[k] - other.effects[e].p[k]) > difference_step(infos[k], active.p[k]))
+        return true;
+  }
+  return false;
+}
+
 std::vector<HeadGeometry> head_geometries(const VisitLog& log,
                                           const EnlargedParameters& parameters) {
   std::vector<HeadGeometry> heads;

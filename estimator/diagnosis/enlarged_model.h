@@ -42,6 +42,10 @@ struct EnlargedParameters {
   double mps2_per_V(std::size_t axis) const;
 };
 
+/// Whether any free shape differs by more than the step over which a Jacobian is taken. Both have
+/// the same effects.
+bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other);
+
 /// Head and base at every visit with the model's head effects.
 std::vector<HeadGeometry> head_geometries(const VisitLog& log,
                                           const EnlargedParameters& parameters);

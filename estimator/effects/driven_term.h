@@ -18,7 +18,7 @@ class DrivenTerm : public SmoothTerm {
       : driver_(std::move(driver)),
         target_(target),
         range_(driver_->span ? *driver_->span : range_of(driver_->value)),
-        values_(driver_->fewest_values()) {}
+        values_(driver_->fewest_values) {}
 
   std::string id() const override {
     return "unlisted:" + driver_->name + ":" + to_string(target_.form);
@@ -36,13 +36,27 @@ class DrivenTerm : public SmoothTerm {
   bool guesses_at_start() const override { return !driver_->past.empty(); }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*target_.angle +=
-        of_visit(0, visit, p) * target_.factor_at(log.visits[visit]) * effect::kRadPerDeg;
+    displace_by_number(log, visit, of_visit(0, visit, p), head);
+  }
+  void displace_by_number(const VisitLog& log, std::size_t visit, double f,
+                          HeadGeometry& head) const override {
+    head.*target_.angle += f * target_.factor_at(log.visits[visit]) * effect::kRadPerDeg;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double f = driver_->output_of == input.axis ? at(input.output_V, p)
                                                       : of_visit(input.axis, input.visit, p);
+    return term_of_number_g(input, f);
+  }
+  double term_of_number_g(const TermInput& input, double f) const override {
     return f * target_.factor(input);
+  }
+  std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t axis,
+                                        const double* p) const override {
+    std::vector<double> f;
+    if (driver_->output_of == axis) return f;  // the model's
+    for (std::size_t visit = 0; visit < log.visits.size(); ++visit)
+      f.push_back(of_visit(axis, visit, p));
+    return f;
   }
 
  protected:

@@ -144,11 +144,12 @@ std::string Driver::unit() const {
   return component || name == "previous_pose" ? "g" : "";
 }
 
-std::size_t Driver::fewest_values() const {
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (const std::vector<double>& of_axis : value)
-    fewest = std::min(fewest, std::set<double>(of_axis.begin(), of_axis.end()).size());
-  return fewest;
+DriverPointer shared(Driver driver) {
+  driver.fewest_values = std::numeric_limits<std::size_t>::max();
+  for (const std::vector<double>& of_axis : driver.value)
+    driver.fewest_values =
+        std::min(driver.fewest_values, std::set<double>(of_axis.begin(), of_axis.end()).size());
+  return std::make_shared<const Driver>(std::move(driver));
 }
 
 std::vector<Driver> instantaneous_drivers(const VisitLog& log) {

@@ -33,13 +33,15 @@ struct Driver {
   /// reference of temp_C, per hour of a rate); empty where it has none.
   std::string unit() const;
   bool varies() const;
-  /// How many different values it took on any axis at least.
-  std::size_t fewest_values() const;
+  std::size_t fewest_values = 0;  ///< different ones on any axis at least; counted by shared()
   bool way_begins(std::size_t visit) const { return visit == 0 || visit == begins_anew; }
   bool is_clock() const { return name == "t_s"; }
   bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column
 };
 using DriverPointer = std::shared_ptr<const Driver>;
+
+/// For the functions of it.
+DriverPointer shared(Driver driver);
 
 /// What a driver is of, if that was recorded: the name without what makes it a rate.
 std::string recorded_column(const std::string& driver);

@@ -11,6 +11,10 @@ void Effect::displace(const VisitLog&, std::size_t, const double*, HeadGeometry&
 
 double Effect::term_g(const TermInput&, const double*) const { return 0; }
 
+double Effect::term_of_number_g(const TermInput&, double) const { return 0; }
+
+void Effect::displace_by_number(const VisitLog&, std::size_t, double, HeadGeometry&) const {}
+
 Eigen::VectorXd Effect::course_g(const TermInput& input, const double* p) const {
   return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(input.at().count), term_g(input, p));
 }

@@ -98,6 +98,17 @@ class Effect {
                         HeadGeometry& head) const;
   /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
   virtual double term_g(const TermInput& input, const double* p) const;
+  /// Where the term (head: the angle) is a number of the visit, whatever the model is, times what
+  /// the model makes of it: that number at every visit, for whoever asks again and again. Empty
+  /// where the term is no such product.
+  virtual std::vector<double> numbers_of_visits(const VisitLog&, std::size_t /*axis*/,
+                                                const double* /*p*/) const {
+    return {};
+  }
+  /// term_g() and displace() from that number.
+  virtual double term_of_number_g(const TermInput& input, double number) const;
+  virtual void displace_by_number(const VisitLog& log, std::size_t visit, double number,
+                                  HeadGeometry& head) const;
   /// Sensor: whether it is a function of what the converter is given, all other terms included.
   virtual bool at_converter() const { return false; }
   /// Sensor: whether the noise of single readings is smaller where it acts.

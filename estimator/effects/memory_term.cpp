@@ -150,14 +150,28 @@ class MemoryTerm final : public SmoothTerm {
     return starts;
   }
   double term_g(const TermInput& input, const double* p) const override {
-    if (p[3] > longest_s_) return 0;
-    const double value = memory_->at(p[3], input.axis, input.visit);
-    // What was remembered before the first visit, nobody saw.
-    const double start = p[4] * effect::mean_decay(input.at(), p[2], p[3]);
-    return target_.factor(input) * (start + legendre_series(value, p[0], p[1], p + 5, 1));
+    return term_of_number_g(input, of_visit(input.log, input.axis, input.visit, p));
+  }
+  double term_of_number_g(const TermInput& input, double f) const override {
+    return target_.factor(input) * f;
+  }
+  std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t axis,
+                                        const double* p) const override {
+    std::vector<double> f;
+    for (std::size_t visit = 0; visit < log.visits.size(); ++visit)
+      f.push_back(of_visit(log, axis, visit, p));
+    return f;
   }
 
  private:
+  double of_visit(const VisitLog& log, std::size_t axis, std::size_t visit, const double* p) const {
+    if (p[3] > longest_s_) return 0;
+    const double value = memory_->at(p[3], axis, visit);
+    // What was remembered before the first visit, nobody saw.
+    const double start = p[4] * effect::mean_decay(log.visits[visit], p[2], p[3]);
+    return start + legendre_series(value, p[0], p[1], p + 5, 1);
+  }
+
   std::shared_ptr<const Memory> memory_;
   Target target_;
   double longest_s_;

@@ -86,7 +86,7 @@ class TermList {
     for_each(changes_of_others(log_), add_line);
     for_each(sizes_of_changes(log_), add_line);
     add_of_wound_up_spindle();
-    const auto attitude = std::make_shared<const Driver>(load(log_));
+    const auto attitude = shared(load(log_));
     if (any_ || attitude->varies()) {
       add(play(attitude, kBias));
       add(friction(attitude, kBias));
@@ -94,7 +94,7 @@ class TermList {
     }
     for (auto& term : memory_terms(log_, longest_s(), attitude, columns_)) add(std::move(term));
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const auto code = std::make_shared<const Driver>(code_driver(log_, axis));
+      const auto code = shared(code_driver(log_, axis));
       if (any_ || code->varies()) add_of_code(code);
     }
     for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
@@ -111,7 +111,7 @@ class TermList {
   template <class Use>
   void for_each(std::vector<Driver> drivers, const Use& use) {
     for (Driver& each : drivers) {
-      const auto driver = std::make_shared<const Driver>(std::move(each));
+      const auto driver = shared(std::move(each));
       if (any_ || driver->varies()) use(driver);
     }
   }
@@ -263,7 +263,7 @@ class TermList {
   }
   /// What winds up with the spindle does not know that 360° are 0°.
   void add_of_wound_up_spindle() {
-    const auto turn = std::make_shared<const Driver>(angle_without_return(log_));
+    const auto turn = shared(angle_without_return(log_));
     for (const Target& target : {kBias, kScale, kDelta, kH})
       add_polynomials(turn, target, {1, 2, 3});
     for (const Target& target : {kDelta, kH, kSkew}) add(wave(turn, target, {0.2, 0.2, 6}));

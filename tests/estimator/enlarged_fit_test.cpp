@@ -38,7 +38,7 @@ EnlargedFit fit_of_two_waves(double cycles, double other_cycles) {
   Observations observed = observe(data.run, log);
   std::shared_ptr<const Driver> clock;
   for (Driver& driver : instantaneous_drivers(log))
-    if (driver.is_clock()) clock = std::make_shared<const Driver>(std::move(driver));
+    if (driver.is_clock()) clock = shared(std::move(driver));
   const std::vector<double>& t_s = clock->value[0];
   const double span_s = t_s.back() - t_s.front();
   for (Eigen::Index k = 0; k < observed.mean_V[0].size(); ++k) {
