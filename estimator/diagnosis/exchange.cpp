@@ -289,6 +289,21 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
   return best;
 }
 
+/// The same with all shapes free, where some were held while what now stands beside them was
+/// missing.
+EnlargedFit with_shapes_released(const SearchModel& model, EnlargedFit fit) {
+  EnlargedParameters released = fit.parameters;
+  for (ActiveEffect& active : released.effects) {
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (infos[k].role == ParameterRole::shape) active.free[k] = true;
+  }
+  if (released.free_count() == fit.parameters.free_count()) return fit;
+  EnlargedFit other =
+      fit_enlarged(model.input().log, model.stage().observed, model.stage().whitening, released);
+  return other.determined && other.chi2 < fit.chi2 ? other : fit;
+}
+
 /// Named candidates in the place of a subset, as many as are cheapest; empty if none are worth
 /// their price.
 std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named& named,
@@ -302,9 +317,10 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
     std::optional<Next> next =
         likeliest_beside(model, named, fit, most - names.size(), fit.chi2 + price - least_cost);
     if (!next) break;
-    price += model.price_in(next->fit, next->entry.candidate);
+    fit = with_shapes_released(model, std::move(next->fit));
+    price += model.price_in(fit, next->entry.candidate);
+    next->entry.parameters = fit.parameters;
     names.push_back(std::move(next->entry));
-    fit = std::move(next->fit);
     if (fit.chi2 + price >= least_cost) continue;
     least_cost = fit.chi2 + price;
     worth = names.size();

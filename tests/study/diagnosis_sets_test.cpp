@@ -289,5 +289,21 @@ TEST(DiagnosisSets, AStraightLineInAColumnIsTheColumnsEffect) {
   EXPECT_EQ(outcome.unlisted, 0) << outcome.found;
 }
 
+// Beside a polynomial that stood for both, the time constant was held where it was, and there the
+// two did not explain what they explain.
+TEST(DiagnosisSets, WhatWasHeldBesideAStructureIsFreeBesideNames) {
+  const SetOutcome outcome = run_set({.seed = 890027,
+                                      .effects = {"sensor.settling", "sensor.hysteresis"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::white,
+                                      .bits = 16,
+                                      .samples_per_pose = 40,
+                                      .static_s = 1800});
+  EXPECT_EQ(outcome.named, 2) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.unlisted, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.2 * outcome.told_fresh);
+}
+
 }  // namespace
 }  // namespace plumbline::study
