@@ -93,6 +93,7 @@ bool begin_at_one_voltage(const std::vector<Suspect>& suspects, double within) {
 
 std::vector<OutlyingReading> readings_of(const std::vector<Suspect>& suspects) {
   std::vector<OutlyingReading> readings;
+  readings.reserve(suspects.size());
   for (const Suspect& suspect : suspects) readings.push_back(suspect.reading);
   return readings;
 }
