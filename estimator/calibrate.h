@@ -235,7 +235,7 @@ struct Calibration {
   std::size_t samples = 0;
   std::size_t skipped_rows = 0;
   PerAxis<std::size_t> outlying_readings{};  ///< left out (outlying_readings.h)
-  std::vector<ColumnRange> ranges;  ///< of the recorded columns
+  std::vector<ColumnRange> ranges;           ///< of the recorded columns
   PerAxis<NoiseModel> noise;
   PerAxis<std::optional<QuantizationUse>> quantization;  ///< nothing: steps do not matter
   ModelEstimates estimates;                              ///< the paper's 12-parameter model
