@@ -5,6 +5,7 @@
 #include <span>
 
 #include "estimator/effects/code_evidence.h"
+#include "estimator/median.h"
 
 namespace plumbline {
 namespace {
@@ -13,12 +14,6 @@ constexpr std::size_t kFewestReadings = 8;
 constexpr double kFar = 8;           // standard deviations
 constexpr double kFewestSteps = 4;   // of the converter
 constexpr double kMostShare = 0.02;  // of all readings
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Neighbouring readings that are alike but for their noise.
 struct Group {

@@ -6,6 +6,9 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
+
+#include "estimator/median.h"
 
 namespace plumbline {
 namespace {
@@ -110,15 +113,14 @@ Eigen::VectorXd burst_variance_V2(const MeasurementSet& set, std::size_t axis, d
   if (n == 0 || std::any_of(set.poses.begin(), set.poses.end(), is_short)) return variance_V2;
   std::vector<Differences> dwells;
   for (const Pose& pose : set.poses) dwells.push_back(differences_of(set.samples.u_V[axis], pose));
-  const auto median = [&](double Differences::*value) {
+  const auto usual = [&](double Differences::*value) {
     std::vector<double> values;
     values.reserve(dwells.size());
     for (const Differences& dwell : dwells) values.push_back(dwell.*value);
-    std::nth_element(values.begin(), values.begin() + n / 2, values.end());
-    return values[static_cast<std::size_t>(n / 2)];
+    return median(std::move(values));
   };
-  const double usual_V = median(&Differences::typical_V);
-  const double usual_V2 = median(&Differences::mean_square_V2);
+  const double usual_V = usual(&Differences::typical_V);
+  const double usual_V2 = usual(&Differences::mean_square_V2);
   if (std::sqrt(usual_V2 / 2) < kSeen * step_V) return variance_V2;
   for (Eigen::Index k = 0; k < n; ++k) {
     const Differences& dwell = dwells[static_cast<std::size_t>(k)];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "estimator/parallel_for.h"
 
@@ -37,12 +38,20 @@ ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& 
   return active;
 }
 
-ActiveEffect with_shapes_held(ActiveEffect active) {
+namespace {
+
+ActiveEffect with_shapes(ActiveEffect active, bool free) {
   const auto infos = active.effect->parameters();
   for (std::size_t k = 0; k < infos.size(); ++k)
-    if (infos[k].role == ParameterRole::shape) active.free[k] = false;
+    if (infos[k].role == ParameterRole::shape) active.free[k] = free;
   return active;
 }
+
+}  // namespace
+
+ActiveEffect with_shapes_held(ActiveEffect active) { return with_shapes(std::move(active), false); }
+
+ActiveEffect with_shapes_free(ActiveEffect active) { return with_shapes(std::move(active), true); }
 
 Eigen::Index ActiveEffect::free_count() const { return std::count(free.begin(), free.end(), true); }
 

@@ -24,8 +24,9 @@ struct ActiveEffect {
 std::vector<std::size_t> axes_of(const ActiveEffect& active);
 /// Free are the amplitudes that are not zero and the shapes; indices stay.
 ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis);
-/// The same with its shapes as they are.
+/// The same with its shapes as they are; with all of them free.
 ActiveEffect with_shapes_held(ActiveEffect active);
+ActiveEffect with_shapes_free(ActiveEffect active);
 
 /// All parameters of the enlarged model.
 struct EnlargedParameters {

@@ -293,11 +293,7 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Named& name
 /// missing.
 EnlargedFit with_shapes_released(const SearchModel& model, EnlargedFit fit) {
   EnlargedParameters released = fit.parameters;
-  for (ActiveEffect& active : released.effects) {
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (infos[k].role == ParameterRole::shape) active.free[k] = true;
-  }
+  for (ActiveEffect& active : released.effects) active = with_shapes_free(std::move(active));
   if (released.free_count() == fit.parameters.free_count()) return fit;
   EnlargedFit other =
       fit_enlarged(model.input().log, model.stage().observed, model.stage().whitening, released);

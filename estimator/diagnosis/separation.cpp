@@ -8,8 +8,10 @@
 #include <random>
 #include <span>
 #include <tuple>
+#include <utility>
 
 #include "estimator/effects/smooth_term.h"
+#include "estimator/median.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -82,8 +84,7 @@ class NewRows {
       // What a pose has for itself once the slow noise is known from its neighbours.
       std::vector<double> own(static_cast<std::size_t>(whitening.lower[i].rows()));
       Eigen::Map<Eigen::VectorXd>(own.data(), std::ssize(own)) = whitening.lower[i].diagonal();
-      std::nth_element(own.begin(), own.begin() + std::ssize(own) / 2, own.end());
-      mean_sd_V_[i] = own[own.size() / 2] / std::sqrt(std::clamp(samples_factor, 1.0, 2.0));
+      mean_sd_V_[i] = median(std::move(own)) / std::sqrt(std::clamp(samples_factor, 1.0, 2.0));
       dwell_sd_V_[i] = whitening.dwell_sd_V[i];
     }
   }

@@ -17,8 +17,7 @@ class DrivenTerm : public SmoothTerm {
   DrivenTerm(DriverPointer driver, Target target)
       : driver_(std::move(driver)),
         target_(target),
-        range_(driver_->span ? *driver_->span : range_of(driver_->value)),
-        values_(driver_->fewest_values) {}
+        range_(driver_->span ? *driver_->span : range_of(driver_->value)) {}
 
   std::string id() const override {
     return "unlisted:" + driver_->name + ":" + to_string(target_.form);
@@ -99,7 +98,7 @@ class DrivenTerm : public SmoothTerm {
   /// Whether the driver took enough different values to tell a polynomial of this degree.
   bool resolves(int degree) const {
     constexpr double kPerDegree = 1.5;
-    return static_cast<double>(values_) >= kPerDegree * degree;
+    return static_cast<double>(driver_->fewest_values) >= kPerDegree * degree;
   }
   const Driver& variable() const { return *driver_; }
   const Target& target() const { return target_; }
@@ -118,7 +117,6 @@ class DrivenTerm : public SmoothTerm {
   DriverPointer driver_;
   Target target_;
   std::pair<double, double> range_;  ///< asked for whenever a parameter is described
-  std::size_t values_;               ///< likewise: different ones
 };
 
 }  // namespace plumbline

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/median.h"
+
 namespace plumbline {
 
 namespace {
@@ -119,9 +121,7 @@ std::vector<SampleWindow> pose_windows(const SampleTable& samples, const std::ve
       steps.push_back(samples.t_s[i] - samples.t_s[i - 1]);
     double step = 0;
     if (!steps.empty()) {
-      const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-      std::nth_element(steps.begin(), middle, steps.end());
-      step = *middle;
+      step = median(steps);
       other_step = step;
     }
     windows.push_back({samples.t_s[pose.first], step, pose.count});

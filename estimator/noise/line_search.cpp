@@ -6,6 +6,7 @@
 #include <complex>
 #include <numbers>
 
+#include "estimator/median.h"
 #include "estimator/noise/spectrum.h"
 #include "estimator/noise/spectrum_fit.h"
 #include "estimator/noise/spectrum_sums.h"
@@ -84,9 +85,7 @@ Level measure_level(const std::vector<double>& ratio) {
     const std::size_t to = b + 1 >= blocks ? ratio.size() - 1 : begin_of(wide ? b + 2 : b + 1);
     window.assign(ratio.begin() + static_cast<std::ptrdiff_t>(from),
                   ratio.begin() + static_cast<std::ptrdiff_t>(std::max(to, from + 1)));
-    const auto middle = window.begin() + static_cast<std::ptrdiff_t>(window.size() / 2);
-    std::nth_element(window.begin(), middle, window.end());
-    level.value.push_back(*middle / std::numbers::ln2);
+    level.value.push_back(median(window) / std::numbers::ln2);
     // A median has 48 % of the efficiency of the mean.
     level.m.push_back(0.48 * static_cast<double>(window.size()));
   }

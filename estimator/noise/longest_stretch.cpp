@@ -1,6 +1,8 @@
 #include "estimator/noise/longest_stretch.h"
 
-#include <algorithm>
+#include <utility>
+
+#include "estimator/median.h"
 
 namespace plumbline {
 
@@ -11,9 +13,7 @@ Stretch longest_stretch(const std::vector<double>& t_s) {
   std::vector<double> steps_s;
   steps_s.reserve(t_s.size() - 1);
   for (std::size_t i = 1; i < t_s.size(); ++i) steps_s.push_back(t_s[i] - t_s[i - 1]);
-  const auto middle = steps_s.begin() + std::ssize(steps_s) / 2;
-  std::nth_element(steps_s.begin(), middle, steps_s.end());
-  const double longest_step_s = kGap * *middle;
+  const double longest_step_s = kGap * median(std::move(steps_s));
 
   longest.count = 0;
   std::size_t first = 0;

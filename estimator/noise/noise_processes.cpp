@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "estimator/median.h"
+
 namespace plumbline {
 
 namespace {
@@ -47,8 +49,7 @@ NoiseProcesses noise_processes(const std::vector<SampleWindow>& windows,
   std::vector<double> dwell_s;
   dwell_s.reserve(windows.size());
   for (const SampleWindow& window : windows) dwell_s.push_back(window.duration_s());
-  std::nth_element(dwell_s.begin(), dwell_s.begin() + std::ssize(dwell_s) / 2, dwell_s.end());
-  const double shortest_s = 0.5 * dwell_s[dwell_s.size() / 2];
+  const double shortest_s = 0.5 * median(std::move(dwell_s));
   double tau_s = 0.7 * span_s;
   while (tau_s > shortest_s) {
     processes.decay_per_s.push_back(1 / tau_s);
