@@ -7,6 +7,7 @@
 
 #include "app/certificate/rounding.h"
 #include "estimator/decision.h"
+#include "estimator/shifted_parameters.h"
 
 namespace plumbline::app {
 
@@ -70,7 +71,7 @@ std::string error_rows(const Calibration& calibration,
   std::string rows = error_header();
   rows += error_row("twelve parameters, poses left out of the fit",
                     calibration.before.heldout_pose_rms_mps2);
-  if (!calibration.diagnosis.effects.empty()) {
+  if (calibration.diagnosis.enlarges_model()) {
     rows += error_row("with the added effects, poses left out",
                       calibration.after.heldout_pose_rms_mps2);
   }
@@ -81,6 +82,17 @@ std::string error_rows(const Calibration& calibration,
         verification->after.pose_rms_mps2);
   }
   return rows;
+}
+
+/// Nothing where there are none.
+std::string shifted_line(const Calibration& calibration) {
+  std::string text;
+  for (const ShiftedParameter& p : shifted_parameters(calibration)) {
+    const double uncertainties = std::abs(p.after - p.before) / (kCoverageFactor * p.u);
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", parameter_name(p.axis, p.column),
+                        significant(uncertainties, 2));
+  }
+  return text.empty() ? text : "changed by the added effects, in multiples of U: " + text + '\n';
 }
 
 std::string verdict_words(const Calibration& calibration) {
@@ -156,6 +168,7 @@ std::string summary(const RunDescription& description, const Calibration& calibr
   text += error_rows(calibration, verification);
   text += fmt::format("diagnosis: {}: {}\n", to_string(calibration.diagnosis.verdict),
                       calibration.diagnosis.reason);
+  text += shifted_line(calibration);
   for (const auto& [name, ambiguity] : calibration.diagnosis.findings()) {
     if (!ambiguity.separate_by.empty())
       text += fmt::format("to tell {} apart: {}{}\n", name, ambiguity.separate_by,

@@ -246,7 +246,7 @@ struct Calibration {
   ErrorFigures after;
   PerAxis<double> floor_pose_rms_mps2{};
   PerAxis<double> u_floor_pose_rms_mps2{};  ///< from the uncertainty of the noise terms
-  /// Of estimates.batch_ls, by the GUM and by its Supplement 1.
+  /// Of final.batch_ls, by the GUM and by its Supplement 1.
   std::optional<UncertaintyReport> uncertainty;
   Decision decision;
   std::vector<PoseResult> pose_results;

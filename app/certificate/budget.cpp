@@ -61,6 +61,13 @@ Budget budget_of(const Calibration& calibration, const RunDescription& descripti
   budget.lines = {line(BudgetSource::delta, 0, description.angles.delta_arcsec, angles.delta),
                   line(BudgetSource::h, 0, description.angles.h_arcsec, angles.h),
                   line(BudgetSource::gravity, gravity.local_mps2, gravity.u_mps2, by_gravity)};
+  if (calibration.uncertainty) {
+    const auto& parameter = calibration.uncertainty->parameter[axis];
+    const double u = parameter[static_cast<std::size_t>(column)].budget.alternatives;
+    constexpr double kFeltShare = 5e-4;
+    if (u * u > kFeltShare * variance)
+      budget.lines.push_back(line(BudgetSource::alternatives, 0, u, 1));
+  }
   double rest = variance;
   for (const BudgetLine& l : budget.lines) rest -= l.contribution * l.contribution;
   BudgetLine readings =

@@ -7,7 +7,7 @@
 
 namespace plumbline::app {
 
-enum class BudgetSource { readings, delta, h, gravity };
+enum class BudgetSource { readings, delta, h, gravity, alternatives };
 
 struct BudgetLine {
   BudgetSource source = BudgetSource::readings;
@@ -30,9 +30,9 @@ struct Budget {
 
 /// The combined variance is that of the certified estimate. Taken out of it: the local gravity (all
 /// K of all axes scale with it) and the head's positioning, carried through the least-squares
-/// solution on the poses of the run, δ and h of every pose independent. The rest is the scatter of
-/// the readings: identified noise, rounding by the converter, and what estimating the added effects
-/// together costs.
+/// solution on the poses of the run, δ and h of every pose independent; and what the alternatives
+/// of the findings add, where there are any. The rest is the scatter of the readings: identified
+/// noise, rounding by the converter, and what estimating the added effects together costs.
 Budget budget_of(const Calibration& calibration, const RunDescription& description,
                  std::size_t axis, Eigen::Index column);
 

@@ -28,12 +28,6 @@ void Composer::add(Block block) const {
   document.blocks.push_back(std::move(block));
 }
 
-std::string parameter_name(std::size_t axis, Eigen::Index column) {
-  return column == 3
-             ? fmt::format("U_{}0", kAxisName[axis])
-             : fmt::format("K_{}{}", kAxisName[axis], kAxisName[static_cast<std::size_t>(column)]);
-}
-
 std::string milli_mps2(double value_mps2) { return significant(1e3 * value_mps2, 3); }
 
 std::string sentence(std::string text) {

@@ -40,8 +40,6 @@ void add_scalar_budget(const Composer& composer);
 
 /// The empty table of an uncertainty budget; `contribution` heads the column of c·u.
 Table budget_table(const Composer& composer, std::string caption, std::string contribution);
-/// "K_xy"; column 3: "U_x0".
-std::string parameter_name(std::size_t axis, Eigen::Index column);
 /// mm/s² of m/s², three digits.
 std::string milli_mps2(double value_mps2);
 /// Capital letter, full stop; an effect's id at the beginning stays as it is written.

@@ -10,6 +10,7 @@
 #include "app/certificate/rounding.h"
 #include "estimator/decision.h"
 #include "estimator/noise/chi_squared.h"
+#include "estimator/shifted_parameters.h"
 
 namespace plumbline::app::content {
 namespace {
@@ -105,6 +106,24 @@ void add_alternatives(const Composer& c) {
   if (facts.rows.empty()) return;
   c.add(Paragraph{c.tr("What could not be told apart:")});
   c.add(std::move(facts));
+}
+
+/// What the twelve parameters were without the added effects, where that was something else.
+void add_shifted(const Composer& c) {
+  const std::vector<ShiftedParameter> shifted = shifted_parameters(c.input.calibration);
+  if (c.input.scalar != nullptr || shifted.empty()) return;
+  Table table;
+  table.caption = c.tr(
+      "Parameters that the added effects changed by more than the expanded uncertainty, mV/g (mV)");
+  table.header = {c.tr("parameter"), c.tr("twelve parameters alone"),
+                  c.tr("with the added effects"), c.tr("change in U")};
+  for (const ShiftedParameter& p : shifted) {
+    const double U = 2e3 * p.u;
+    table.rows.push_back({parameter_name(p.axis, p.column), round_result(1e3 * p.before, U).value,
+                          round_result(1e3 * p.after, U).value,
+                          significant(1e3 * (p.after - p.before) / U, 2)});
+  }
+  c.add(std::move(table));
 }
 
 /// An effect that was looked for and not found, and how large it would have had to be.
@@ -306,6 +325,7 @@ void add_findings(const Composer& c) {
   if (!c.input.calibration.diagnosis.findings().empty()) {
     add_effect_table(c);
     add_terms(c);
+    add_shifted(c);
     add_alternatives(c);
   }
   if (auto figure = evidence_figure({c.calibration, c.tr})) c.add(*std::move(figure));

@@ -8,6 +8,7 @@
 #include "app/certificate/figures.h"
 #include "app/certificate/rounding.h"
 #include "app/certificate/sensor_terms.h"
+#include "estimator/shifted_parameters.h"
 
 namespace plumbline::app::content {
 namespace {
@@ -154,6 +155,8 @@ std::string source_name(const Composer& c, BudgetSource source) {
       return c.tr("positioning in δ, each pose");
     case BudgetSource::h:
       return c.tr("positioning in h, each pose");
+    case BudgetSource::alternatives:
+      return c.tr("alternatives of the findings");
     case BudgetSource::gravity:
       break;
   }
@@ -172,18 +175,21 @@ void add_budget_rows(const Composer& c, const Budget& budget, Table& table) {
   for (const BudgetLine& line : budget.lines) {
     // What cannot matter is left out: gravity acts on no offset.
     if (offset && line.source == BudgetSource::gravity) continue;
+    const bool alternatives = line.source == BudgetSource::alternatives;
     const bool readings = line.source == BudgetSource::readings;
     const bool gravity = line.source == BudgetSource::gravity;
-    const std::string input_unit = readings ? unit : gravity ? "m/s²" : "″";
-    const double scale = readings ? 1e3 : 1;
+    const bool own_unit = readings || alternatives;  // that of the parameter
+    const std::string input_unit = own_unit ? unit : gravity ? "m/s²" : "″";
+    const double scale = own_unit ? 1e3 : 1;
     table.rows.push_back(
         {first ? name : "", source_name(c, line.source),
-         readings  ? significant(scale * line.estimate, 6) + " " + unit
-         : gravity ? significant(line.estimate, 7) + " m/s²"
-                   : "0″",
+         readings       ? significant(scale * line.estimate, 6) + " " + unit
+         : gravity      ? significant(line.estimate, 7) + " m/s²"
+         : alternatives ? "0 " + unit
+                        : "0″",
          c.tr("normal"),
          significant(scale * line.u, 2) + (input_unit == "″" ? "" : " ") + input_unit,
-         degrees_of_freedom(line.dof), readings ? "1" : significant(1e3 * line.sensitivity, 2),
+         degrees_of_freedom(line.dof), own_unit ? "1" : significant(1e3 * line.sensitivity, 2),
          significant(1e3 * line.contribution, 2), fmt::format("{:.1f} %", 100 * line.share)});
     first = false;
   }
@@ -223,9 +229,12 @@ void add_budget(const Composer& c) {
   Table table =
       budget_table(c, c.tr("Scale factors and offsets (GUM, JCGM 100:2008), U with k = 2"),
                    c.tr("c·u, mV/g (mV)"));
+  bool alternatives = false;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     for (const Eigen::Index column : {static_cast<Eigen::Index>(i), Eigen::Index{3}}) {
-      add_budget_rows(c, budget_of(calibration, c.input.description, i, column), table);
+      const Budget budget = budget_of(calibration, c.input.description, i, column);
+      alternatives |= budget.lines.back().source == BudgetSource::alternatives;
+      add_budget_rows(c, budget, table);
     }
   }
   c.add(std::move(table));
@@ -234,6 +243,11 @@ void add_budget(const Composer& c) {
            "converter, the repeatability of the unit within the run, and what estimating the "
            "added effects together with the parameters costs."),
       Tone::note});
+  if (alternatives)
+    c.add(Paragraph{c.tr("What was found could be something else on these data, with other "
+                         "parameters: the alternatives stand with the findings, and each counts "
+                         "by its odds."),
+                    Tone::note});
   c.add(budget_figure({c.calibration, c.tr}, c.input.description));
   add_monte_carlo(c);
 }

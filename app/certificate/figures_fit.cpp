@@ -13,12 +13,13 @@
 #include "app/certificate/rounding.h"
 #include "app/figure/allan_figure.h"
 #include "app/figure/plot.h"
+#include "estimator/shifted_parameters.h"
 
 namespace plumbline::app {
 namespace {
 
 /// From dark to light, so that the parts of a bar stay apart without colour.
-constexpr std::array kPartColors = {"#08519c", "#d55e00", "#e8b35a", "#d9d9d9"};
+constexpr std::array kPartColors = {"#08519c", "#d55e00", "#e8b35a", "#d9d9d9", "#009e73"};
 
 }  // namespace
 
@@ -159,17 +160,16 @@ Figure budget_figure(const FigureContext& context, const RunDescription& descrip
     const double width = kFigureWidth - kLeft - 130;
     const std::array<std::string, kPartColors.size()> names = {
         context.tr("readings"), context.tr("angle δ"), context.tr("angle h"),
-        context.tr("local gravity")};
+        context.tr("local gravity"), context.tr("alternatives")};
+    std::size_t parts = 0;
+    for (const Budget& budget : budgets) parts = std::max(parts, budget.lines.size());
     std::vector<LegendEntry> legend;
-    for (std::size_t k = 0; k < names.size(); ++k)
-      legend.push_back({names[k], {}, kPartColors[k], 1});
+    for (std::size_t k = 0; k < parts; ++k) legend.push_back({names[k], {}, kPartColors[k], 1});
     draw_legend(canvas, {kLeft, 22}, legend);
     double y = kTop;
     for (const Budget& budget : budgets) {
       const bool offset = budget.column == 3;
-      canvas.text({kLeft - 8, y + 12},
-                  offset ? fmt::format("U_{}0", kAxisName[budget.axis])
-                         : fmt::format("K_{0}{0}", kAxisName[budget.axis]),
+      canvas.text({kLeft - 8, y + 12}, parameter_name(budget.axis, budget.column),
                   {11, Anchor::end});
       double x = kLeft;
       for (std::size_t k = 0; k < budget.lines.size(); ++k) {

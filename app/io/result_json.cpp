@@ -5,6 +5,7 @@
 
 #include "app/io/diagnosis_json.h"
 #include "app/io/uncertainty_json.h"
+#include "estimator/shifted_parameters.h"
 
 namespace plumbline::app {
 
@@ -66,6 +67,19 @@ Json quantization_json(const Calibration& calibration) {
   });
 }
 
+Json diagnosis_json(const Calibration& calibration) {
+  Json json = json_diagnosis(calibration.diagnosis);
+  Json shifted = Json::array();
+  for (const ShiftedParameter& p : shifted_parameters(calibration))
+    shifted.push_back({{"name", parameter_name(p.axis, p.column)},
+                       {"before", json_number(p.before)},
+                       {"after", json_number(p.after)},
+                       {"u", json_number(p.u)},
+                       {"unit", p.column == 3 ? "V" : "V/g"}});
+  if (!shifted.empty()) json["shifted_parameters"] = std::move(shifted);
+  return json;
+}
+
 Json ranges_json(const std::vector<ColumnRange>& ranges) {
   Json json = Json::object();
   for (const ColumnRange& range : ranges)
@@ -97,7 +111,7 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
           {"estimates", to_json(calibration.estimates)},
           {"uncertainty",
            calibration.uncertainty ? uncertainty_json(*calibration.uncertainty) : Json(nullptr)},
-          {"diagnosis", json_diagnosis(calibration.diagnosis)},
+          {"diagnosis", diagnosis_json(calibration)},
           {"final", to_json(calibration.final)},
           {"error", json_error(calibration)},
           {"decision", json_decision(calibration.decision)}};

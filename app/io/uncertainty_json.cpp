@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/shifted_parameters.h"
+
 namespace plumbline::app {
 
 namespace {
@@ -13,6 +15,7 @@ Json to_json(const ParameterUncertainty& parameter) {
             {"positioning", json_number(std::hypot(budget.delta, budget.h))},
             {"rounding", json_number(budget.rounding)},
             {"gravity", json_number(budget.gravity)},
+            {"alternatives", json_number(budget.alternatives)},
             {"combined", json_number(budget.combined)}}},
           {"gum", json_numbers({parameter.gum_low, parameter.gum_high})},
           {"monte_carlo",
@@ -35,10 +38,8 @@ Json uncertainty_json(const UncertaintyReport& report) {
   json.update(json_per_axis([&](std::size_t axis) -> Json {
     const auto& p = report.parameter[axis];
     Json of_axis = Json::object();
-    for (std::size_t j = 0; j < 3; ++j) {
-      of_axis[std::string("K_") + kAxisName[axis] + kAxisName[j]] = to_json(p[j]);
-    }
-    of_axis[std::string("U_") + kAxisName[axis] + "0"] = to_json(p[3]);
+    for (std::size_t k = 0; k < p.size(); ++k)
+      of_axis[parameter_name(axis, static_cast<Eigen::Index>(k))] = to_json(p[k]);
     return of_axis;
   }));
   return json;

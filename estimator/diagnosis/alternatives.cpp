@@ -43,6 +43,32 @@ bool same_effect(const Candidate& a, const Candidate& b) {
   return a.effect == b.effect && (a.effect->subject() == Subject::head || a.axis == b.axis);
 }
 
+/// Schwarz's approximation of the odds of a rival.
+double odds_of(const EnlargedFit& rival, const SearchResult& result) {
+  const auto further =
+      static_cast<double>(rival.parameters.free_count() - result.fit.parameters.free_count());
+  const double behind = rival.chi2 - result.fit.chi2 + kPricePerParameter * further;
+  return std::exp(-0.5 * std::max(0.0, behind));
+}
+
+/// By how much the free parameters of `found` are others in a model with something else in the
+/// place of effect `index`.
+Eigen::VectorXd shift_to(const EnlargedParameters& rival, const EnlargedParameters& found,
+                         std::size_t index) {
+  Eigen::VectorXd shift = Eigen::VectorXd::Zero(found.free_count());
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    shift.segment<4>(4 * static_cast<Eigen::Index>(axis)) = rival.twelve[axis] - found.twelve[axis];
+  for (std::size_t e = 0; e < found.effects.size(); ++e) {
+    if (e == index) continue;
+    const ActiveEffect& here = found.effects[e];
+    const ActiveEffect& there = rival.effects[e < index ? e : e - 1];
+    Eigen::Index row = found.first_free(e);
+    for (std::size_t k = 0; k < here.p.size(); ++k)
+      if (here.free[k]) shift(row++) = there.p[k] - here.p[k];
+  }
+  return shift;
+}
+
 /// What the codes prove is only replaced by what they prove as well.
 std::vector<Alternative> proven_rivals(const SearchInput& input, const CandidateList& list,
                                        const SearchResult& result, const EnlargedParameters& base,
@@ -54,7 +80,9 @@ std::vector<Alternative> proven_rivals(const SearchInput& input, const Candidate
       continue;
     EnlargedFit fit = fit_from_levels(input.log, result.observed, result.whitening,
                                       with_effect(base, candidate.active()));
-    if (fit.determined) rivals.push_back({candidate.effect->id(), std::move(fit)});
+    if (!fit.determined) continue;
+    const double odds = odds_of(fit, result);
+    rivals.push_back({candidate.effect->id(), std::move(fit), odds});
   }
   return rivals;
 }
@@ -80,8 +108,9 @@ std::optional<Alternative> field_of_room(const SearchInput& input, const Candida
     }
     if (with.effects.size() == base.effects.size()) continue;
     EnlargedFit fit = fit_enlarged(input.log, result.observed, result.whitening, with);
-    if (fit.determined && fit.chi2 <= result.fit.chi2 + kIndistinguishable)
-      return Alternative{field->effect->id(), std::move(fit)};
+    if (!fit.determined || fit.chi2 > result.fit.chi2 + kIndistinguishable) continue;
+    const double odds = odds_of(fit, result);
+    return Alternative{field->effect->id(), std::move(fit), odds};
   }
   return {};
 }
@@ -130,8 +159,10 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
     const std::string id = list.candidates[refined[k].candidate].effect->id();
     if (id != found.effect->id() &&
         std::none_of(singles.begin(), singles.end(),
-                     [&](const Alternative& s) { return s.name == id; }))
-      singles.push_back({id, std::move(fits[k])});
+                     [&](const Alternative& s) { return s.name == id; })) {
+      const double odds = odds_of(fits[k], result);
+      singles.push_back({id, std::move(fits[k]), odds});
+    }
   }
   std::stable_sort(singles.begin(), singles.end(), [](const Alternative& a, const Alternative& b) {
     return a.fit.chi2 < b.fit.chi2;
@@ -170,7 +201,7 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
     std::string name;
     for (const std::string& id : ids) name += (name.empty() ? "" : "+") + id;
-    return {{name, fit}};
+    return {{name, fit, odds_of(fit, result)}};
   }
   return {};
 }
@@ -191,6 +222,18 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
     if (auto field = field_of_room(input, list, result, base)) rivals.push_back(*std::move(field));
   }
   return rivals;
+}
+
+Eigen::MatrixXd covariance_among(const EnlargedParameters& found, std::size_t index,
+                                 const std::vector<Alternative>& alternatives) {
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(found.free_count(), found.free_count());
+  double odds = 1;
+  for (const Alternative& alternative : alternatives) {
+    const Eigen::VectorXd shift = shift_to(alternative.fit.parameters, found, index);
+    covariance += alternative.odds * shift * shift.transpose();
+    odds += alternative.odds;
+  }
+  return covariance / odds;
 }
 
 }  // namespace plumbline

@@ -12,6 +12,7 @@ namespace plumbline {
 struct Alternative {
   std::string name;  ///< an id, or several joined by "+"
   EnlargedFit fit;   ///< the model with it in place of the effect, its own effects last
+  double odds = 0;   ///< against what was found, which the search preferred: at most 1
 };
 
 /// Explanations that these data cannot tell from effect `index` of the result, most likely first.
@@ -22,5 +23,13 @@ struct Alternative {
 /// as a single rival does not do.
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
                                            const SearchResult& result, std::size_t index);
+
+/// What it adds to the covariance of the free parameters that an alternative of effect `index` may
+/// be true instead: Σ w·d·dᵀ over the alternatives, d how the parameters are others with it and w
+/// its share of the odds (the between-model part of Burnham & Anderson 2002, eq. 4.9, about the
+/// model that was chosen). Zero in the rows of the effect itself, which the alternative lacks.
+/// `found`: the model as the same readings give it that gave the alternatives.
+Eigen::MatrixXd covariance_among(const EnlargedParameters& found, std::size_t index,
+                                 const std::vector<Alternative>& alternatives);
 
 }  // namespace plumbline

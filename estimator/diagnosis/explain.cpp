@@ -9,7 +9,6 @@
 #include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/fitted_terms.h"
 #include "estimator/diagnosis/noise_stage.h"
-#include "estimator/diagnosis/separation.h"
 #include "estimator/diagnosis/validated_search.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/diagnosis/wander.h"
@@ -31,9 +30,9 @@ PerAxis<Eigen::VectorXd> stated_means_V(const SearchInput& search, const SearchR
 }
 
 /// Four parameters of one axis out of the joint estimate.
-AxisEstimate axis_of(const EnlargedFit& fit, std::size_t axis) {
+AxisEstimate axis_of(const EnlargedEstimate& estimate, std::size_t axis) {
   const auto at = 4 * static_cast<Eigen::Index>(axis);
-  return {fit.parameters.twelve[axis], fit.covariance.block<4, 4>(at, at)};
+  return {estimate.parameters.twelve[axis], estimate.covariance.block<4, 4>(at, at)};
 }
 
 /// Variance of a visit's mean but for the drifts, which are states of the filters. To them a
@@ -144,6 +143,16 @@ Eigen::MatrixXd with_allowances(const SearchInput& search, const SearchResult& f
   return covariance;
 }
 
+/// What may be true instead of each of the findings, as a part of the covariance.
+/// `found`: the model by the readings that gave the rivals.
+Eigen::MatrixXd covariance_among(const EnlargedParameters& found,
+                                 const std::vector<Rivals>& rivals) {
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(found.free_count(), found.free_count());
+  for (std::size_t e = 0; e < rivals.size(); ++e)
+    covariance += covariance_among(found, e, rivals[e].alternatives);
+  return covariance;
+}
+
 /// How the twelve follow from the means, about the fit: its Gauss–Newton step. The covariance is to
 /// be filled in.
 PropagatedEstimate propagated(const VisitLog& log, const EnlargedFit& fit,
@@ -220,7 +229,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   for (std::size_t i = 0; i < kAxisCount; ++i)
     heldout_errors_mps2[i] += found.fit.parameters.mps2_per_V(i) *
                               (stated_V[i] - found.observed.mean_V[i]).replicate<2, 1>();
-  const Eigen::MatrixXd under_this_noise = found.fit.covariance;
+  const EnlargedEstimate by_means = found.fit;
   Explained explained;
   explained.estimate = codes ? propagated(estimated_log, codes->before_converter.fit,
                                           codes->before_converter.whitening)
@@ -239,10 +248,15 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     found.fit.covariance =
         with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
   }
-  explained.estimate.covariance =
-      found.fit.covariance.topLeftCorner(4 * kAxisCount, 4 * kAxisCount);
-  Diagnosis diagnosis =
-      describe_findings(search, searched.candidates, found, options.reach.value_or(reach_of(log)));
+  const std::vector<Rivals> rivals =
+      find_rivals(search, searched.candidates, found, options.reach.value_or(reach_of(log)));
+  const EnlargedEstimate if_true = found.fit;  // if what was found is what there is
+  const Eigen::MatrixXd among = covariance_among(by_means.parameters, rivals);
+  found.fit.covariance += among;
+  constexpr Eigen::Index kTwelve = 4 * kAxisCount;
+  explained.estimate.covariance = if_true.covariance.topLeftCorner<kTwelve, kTwelve>();
+  explained.estimate.alternatives = among.topLeftCorner<kTwelve, kTwelve>();
+  Diagnosis diagnosis = describe_findings(search, searched.candidates, found, rivals);
   attach_gains(found.evidence, searched.gains, diagnosis);
   if (std::any_of(found.fit.parameters.effects.begin(), found.fit.parameters.effects.end(),
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
@@ -262,7 +276,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   if (joint) {
     EnlargedEstimate filter{estimated.fit.parameters, joint->covariance};
     filter.parameters.set_free_values(joint->value);
-    attach_filter(log, codes ? codes->with_converter(filter, found) : filter, diagnosis);
+    attach_filter(log, if_true, codes ? codes->with_converter(filter, found) : filter, diagnosis);
   }
   PerAxis<bool> concerned{};
   for (const ActiveEffect& active : found.fit.parameters.effects)
@@ -272,7 +286,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   result.schwarz_criterion = schwarz_criterion(found);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = found.fit.parameters.mps2_per_V(i);
-    result.final.batch_ls[i] = with_gravity(axis_of(found.fit, i), gravity);
+    result.final.batch_ls[i] = with_gravity(axis_of(if_true, i), gravity);
     const auto first = 4 * static_cast<Eigen::Index>(i);
     result.final.ekf[i] = with_gravity(
         joint
@@ -281,12 +295,14 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
             : filter_estimate(input, estimated_search, estimated, estimated_V[i] - twelve_V[i], i),
         gravity);
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
+    for (AxisEstimate* estimate : {&result.final.batch_ls[i], &result.final.ekf[i]})
+      estimate->covariance += among.block<4, 4>(first, first);
     const Eigen::VectorXd residual_mps2 = factor * (stated_V[i] - predicted_V[i]);
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
     // The noise estimated beside the effects, not the one that had to take them up.
     const auto block = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     const Eigen::MatrixXd left_V2 =
-        found.noise[i].covariance - block * under_this_noise * block.transpose();
+        found.noise[i].covariance - block * by_means.covariance * block.transpose();
     const double floor_mps2 =
         std::abs(factor) *
         std::sqrt(std::max(

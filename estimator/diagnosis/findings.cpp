@@ -5,9 +5,7 @@
 #include <cstdio>
 #include <iterator>
 
-#include "estimator/diagnosis/alternatives.h"
 #include "estimator/diagnosis/detection_limits.h"
-#include "estimator/diagnosis/separation.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/parallel_for.h"
 
@@ -59,23 +57,6 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
     reported.push_back(std::move(parameter));
   }
   return reported;
-}
-
-/// What else an effect could be, and what would tell.
-struct Rivals {
-  std::vector<Alternative> alternatives;
-  Separation separation;
-};
-
-/// Of each effect in `search`.
-std::vector<Rivals> all_rivals(const SearchInput& input, const CandidateList& list,
-                               const SearchResult& search, const HeadReach& reach) {
-  std::vector<Rivals> rivals(search.evidence.size());
-  parallel_for(rivals.size(), [&](std::size_t e) {
-    rivals[e].alternatives = find_alternatives(input, list, search, e);
-    rivals[e].separation = separate(input, search, e, rivals[e].alternatives, reach);
-  });
-  return rivals;
 }
 
 void add_rivals(const Rivals& rivals, Ambiguity& entry) {
@@ -210,23 +191,35 @@ Reported report(const VisitLog& log, const EnlargedEstimate& estimate) {
   return reported;
 }
 
-void attach(const std::vector<EffectParameter>& filtered, std::vector<EffectParameter>& reported) {
+void attach(const std::vector<EffectParameter>& batch, const std::vector<EffectParameter>& filtered,
+            std::vector<EffectParameter>& reported) {
   for (std::size_t k = 0; k < reported.size(); ++k) {
     if (!reported[k].estimated) continue;
-    const double value = filtered[k].value, u = filtered[k].u;
+    const double value = filtered[k].value, u = filtered[k].u, u_batch = batch[k].u;
     const double difference = std::abs(value - reported[k].value);
-    reported[k].filter = {value, u, difference / (2 * std::hypot(u, reported[k].u))};
+    const double beyond2 = std::max(0.0, reported[k].u * reported[k].u - u_batch * u_batch);
+    reported[k].filter = {value, std::sqrt(u * u + beyond2),
+                          difference / (2 * std::hypot(u, u_batch))};
   }
 }
 
 }  // namespace
 
+std::vector<Rivals> find_rivals(const SearchInput& input, const CandidateList& list,
+                                const SearchResult& search, const HeadReach& reach) {
+  std::vector<Rivals> rivals(search.evidence.size());
+  parallel_for(rivals.size(), [&](std::size_t e) {
+    rivals[e].alternatives = find_alternatives(input, list, search, e);
+    rivals[e].separation = separate(input, search, e, rivals[e].alternatives, reach);
+  });
+  return rivals;
+}
+
 Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
-                            const SearchResult& search, const HeadReach& reach) {
+                            const SearchResult& search, const std::vector<Rivals>& rivals) {
   Diagnosis diagnosis;
   auto [effects, unlisted] = report(input.log, search.fit);
   diagnosis.not_found = detection_limits(input, list, search);
-  const std::vector<Rivals> rivals = all_rivals(input, list, search, reach);
   const std::vector<Place> places = places_of(search.evidence);
   for (std::size_t e = 0; e < places.size(); ++e) {
     const double p_value = search.evidence[e].p_value;
@@ -259,12 +252,15 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
   return diagnosis;
 }
 
-void attach_filter(const VisitLog& log, const EnlargedEstimate& filter, Diagnosis& diagnosis) {
-  const Reported filtered = report(log, filter);
+void attach_filter(const VisitLog& log, const EnlargedEstimate& batch,
+                   const EnlargedEstimate& filter, Diagnosis& diagnosis) {
+  const Reported by_batch = report(log, batch), filtered = report(log, filter);
   for (std::size_t k = 0; k < filtered.effects.size(); ++k)
-    attach(filtered.effects[k].parameters, diagnosis.effects[k].parameters);
+    attach(by_batch.effects[k].parameters, filtered.effects[k].parameters,
+           diagnosis.effects[k].parameters);
   for (std::size_t k = 0; k < filtered.unlisted.size(); ++k)
-    attach(filtered.unlisted[k].parameters, diagnosis.unlisted[k].parameters);
+    attach(by_batch.unlisted[k].parameters, filtered.unlisted[k].parameters,
+           diagnosis.unlisted[k].parameters);
 }
 
 namespace {

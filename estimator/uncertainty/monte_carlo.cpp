@@ -80,7 +80,7 @@ struct Model {
   PerAxis<bool> rounds{};
   Eigen::MatrixXd by_delta{}, by_h{};  ///< 12 × n, parameters' deviations by one u of each angle
   Eigen::MatrixXd noise{};             ///< 12 × 12, what the covariance holds beside the others
-  Eigen::MatrixXd noise_root{};
+  Eigen::MatrixXd noise_root{};        ///< of that and of the alternatives
   /// Whether angles of these uncertainties bend the outputs enough to be felt. If not, what they do
   /// to the parameters is Gaussian, 12 × 12, and is drawn as such instead of angle by angle.
   bool bends = false;
@@ -154,7 +154,7 @@ Model make_model(const PropagatedEstimate& estimate, const std::vector<Pose>& po
                                    (model.u_h_rad * model.slope[i].col(1)).cwiseAbs2();
     model.noise -= estimate.gain[i] * own_V2.asDiagonal() * estimate.gain[i].transpose();
   }
-  model.noise_root = root_of(model.noise);
+  model.noise_root = root_of(model.noise + estimate.alternatives);
   decide_on_angles(model);
   return model;
 }
@@ -215,8 +215,9 @@ ParameterBudget budget_of(const Model& model, Eigen::Index p) {
   budget.rounding = std::sqrt(rounding);
   const double value = model.estimate.value[static_cast<std::size_t>(p / 4)](p % 4);
   budget.gravity = p % 4 < 3 ? std::abs(value) * model.u_gamma : 0;
-  budget.combined = Eigen::Matrix<double, 5, 1>(budget.noise, budget.delta, budget.h,
-                                                budget.rounding, budget.gravity)
+  budget.alternatives = std::sqrt(std::max(model.estimate.alternatives(p, p), 0.0));
+  budget.combined = Eigen::Vector<double, 6>{budget.noise,    budget.delta,   budget.h,
+                                             budget.rounding, budget.gravity, budget.alternatives}
                         .norm();
   return budget;
 }

@@ -21,6 +21,8 @@ struct PropagatedEstimate {
   /// 12 × 12, as the estimation states it: by noise, by rounding, and by positioning as if each
   /// axis had a head of its own; gravity not included.
   Eigen::MatrixXd covariance;
+  /// 12 × 12, beside that: by what may be true instead of the effects that were found.
+  Eigen::MatrixXd alternatives = Eigen::MatrixXd::Zero(4 * kAxisCount, 4 * kAxisCount);
   PerAxis<Eigen::VectorXd> rounding_V2;  ///< n, variance of the offset rounding leaves in a mean
 };
 
@@ -30,6 +32,7 @@ struct ParameterBudget {
   double delta = 0, h = 0;  ///< the head's positioning
   double rounding = 0;
   double gravity = 0;
+  double alternatives = 0;  ///< what may be true instead of the effects that were found
   double combined = 0;
 };
 
@@ -51,7 +54,8 @@ struct UncertaintyReport {
   bool validated = false;   ///< all twelve
 };
 
-/// Distributions: noise normal with what the covariance holds beside positioning and rounding;
+/// Distributions: noise normal with what the covariance holds beside positioning and rounding, and
+/// so is what the alternatives add;
 /// positioning normal in both angles of each pose, seen by all axes alike, through the true
 /// kinematics to second order; rounding rectangular; gravity normal. Trials come in blocks of 10⁴
 /// until mean, u and both ends of every interval are stable to the tolerance. Deterministic in

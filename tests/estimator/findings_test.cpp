@@ -14,6 +14,7 @@
 
 #include "estimator/calibrate.h"
 #include "estimator/kinematics.h"
+#include "estimator/shifted_parameters.h"
 #include "tests/estimator/synthetic_run.h"
 
 namespace plumbline {
@@ -319,6 +320,47 @@ TEST(Findings, PosesBelowTheHorizontalTellAsymmetricalFromSquare) {
     EXPECT_GE(stop.h_deg, -40);
     EXPECT_LE(stop.h_deg, 80);
   }
+}
+
+// Five levels of a_z do not tell a square from what bends the output likewise, with another K_zz.
+TEST(Findings, WhatItMayBeAsWellIsPartOfTheUncertainty) {
+  const SyntheticRun data = square_on_z();
+  const Calibration result = calibrated(data);
+  ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
+  ASSERT_FALSE(result.diagnosis.effects.front().alternatives.empty());
+  ASSERT_TRUE(result.uncertainty.has_value());
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      const double u = std::sqrt(result.final.batch_ls[i].covariance(row, row));
+      EXPECT_NEAR(result.final.batch_ls[i].value(row), data.truth[i][k], 3 * u) << i << ' ' << k;
+      const ParameterUncertainty& stated = result.uncertainty->parameter[i][k];
+      EXPECT_NEAR(stated.budget.combined, u, 0.02 * u) << i << ' ' << k;
+      EXPECT_TRUE(stated.validated) << i << ' ' << k;
+    }
+  }
+  const ParameterBudget& K_zz = result.uncertainty->parameter[2][2].budget;
+  EXPECT_GT(K_zz.alternatives, 2 * K_zz.noise);
+  for (const ParameterUncertainty& x : result.uncertainty->parameter[0])
+    EXPECT_LT(x.budget.alternatives, 1e-6 * x.budget.noise);
+}
+
+TEST(Findings, WhatTheAddedEffectsChangeIsSaid) {
+  SyntheticOptions options;
+  options.k2_x_V_per_g2 = 1e-3;
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
+  const std::vector<ShiftedParameter> shifted = shifted_parameters(result);
+  ASSERT_FALSE(shifted.empty()) << result.diagnosis.reason;
+  std::vector<std::string> names;
+  for (const ShiftedParameter& p : shifted) {
+    names.push_back(parameter_name(p.axis, p.column));
+    EXPECT_EQ(p.axis, 0u);
+    EXPECT_EQ(p.before, result.estimates.batch_ls[p.axis].value(p.column));
+    EXPECT_EQ(p.after, result.final.batch_ls[p.axis].value(p.column));
+    EXPECT_GT(std::abs(p.after - p.before), 2 * p.u);
+  }
+  EXPECT_THAT(names, Contains("U_x0"));  // a square has a mean
+  EXPECT_THAT(shifted_parameters(calibrated(synthetic_run(1, kSixteenBits))), IsEmpty());
 }
 
 TEST(Findings, NothingIsAskedBeyondTheLimitsOfAHead) {

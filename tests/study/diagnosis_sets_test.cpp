@@ -151,6 +151,20 @@ TEST(DiagnosisSets, AStuckBitOfACoarseConverterIsTheOnlyFinding) {
   EXPECT_LT(outcome.after.fresh, 1.5 * outcome.oracle.fresh);
 }
 
+// The step falls between two rings: as well one in a_z, at which U_z0 lies half a step higher.
+TEST(DiagnosisSets, WhatAStepMayBeAsWellIsInTheUncertainty) {
+  const SetOutcome outcome = run_set({.seed = 1310002,
+                                      .effects = {"sensor.bias_step"},
+                                      .size = 10,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::white,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 600});
+  EXPECT_EQ(outcome.named_or_stated, 1) << outcome.found;
+  EXPECT_LT(outcome.worst_U0, 3);
+}
+
 SetOutcome in_strong_slow_noise(const char* effect) {
   return run_set({.seed = 760005,
                   .effects = {effect},
