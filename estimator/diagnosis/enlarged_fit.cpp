@@ -20,25 +20,27 @@ bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, s
 
 constexpr double kLargestChange = 3, kLikelyChange = 2;  // of a sensitivity, as ratios
 
-/// Of the sensitivities, each to its own direction.
-bool are_about_the_size(const EnlargedParameters& parameters, const EnlargedParameters& start,
-                        double most) {
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const auto own = static_cast<Eigen::Index>(i);
-    const double ratio = parameters.twelve[i](own) / start.twelve[i](own);
-    if (!(ratio > 1 / most && ratio < most)) return false;
-  }
-  return true;
+/// Of one axis, to its own direction.
+bool is_about_the_size(const EnlargedParameters& parameters, const EnlargedParameters& start,
+                       std::size_t axis, double most) {
+  const auto own = static_cast<Eigen::Index>(axis);
+  const double ratio = parameters.twelve[axis](own) / start.twelve[axis](own);
+  return ratio > 1 / most && ratio < most;
 }
 
-bool remembers(const EnlargedParameters& parameters) {
+/// Whether part of the response of an axis may be creep.
+bool remembers(const EnlargedParameters& parameters, std::size_t axis) {
   return std::any_of(parameters.effects.begin(), parameters.effects.end(),
-                     [](const ActiveEffect& active) { return active.effect->remembers(); });
+                     [&](const ActiveEffect& active) {
+                       return active.effect->remembers() && active.axis == axis &&
+                              active.effect->subject() == Subject::sensor;
+                     });
 }
 
 // Time constants, widths and the like keep their sign, and sensitivities about their size.
 bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
-  if (!are_about_the_size(trial, start, kLargestChange)) return false;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (!is_about_the_size(trial, start, axis, kLargestChange)) return false;
   for (std::size_t e = 0; e < trial.effects.size(); ++e) {
     const ActiveEffect& active = trial.effects[e];
     const auto infos = active.effect->parameters();
@@ -80,18 +82,20 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& whitened_jacobian) {
 /// a response that is creep for the most part little is known at rest; that is no fault of a fit.
 bool leave_a_sensitivity_open(const EnlargedFit& fit) {
   constexpr double kUncertain = 0.05, kByEffects = 10;  // of the axis's own, as a ratio
-  if (remembers(fit.parameters)) return false;
   std::optional<Eigen::MatrixXd> alone;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (remembers(fit.parameters, axis)) continue;
+    const auto own = static_cast<Eigen::Index>(axis);
+    const double least_V_per_g = kUncertain * std::abs(fit.parameters.twelve[axis](own));
     for (std::size_t component = 0; component < kAxisCount; ++component) {
-      const auto own = static_cast<Eigen::Index>(axis);
       const auto k = static_cast<Eigen::Index>(4 * axis + component);
       const double u_V_per_g = std::sqrt(fit.covariance(k, k));
-      if (u_V_per_g < kUncertain * std::abs(fit.parameters.twelve[axis](own))) continue;
+      if (u_V_per_g < least_V_per_g) continue;
       if (!alone)
         alone = covariance_of(fit.whitened_jacobian.leftCols(fit.parameters.first_free(0)));
       if (u_V_per_g > kByEffects * std::sqrt((*alone)(k, k))) return true;
     }
+  }
   return false;
 }
 
@@ -125,7 +129,19 @@ bool cancel_each_other(const EnlargedFit& fit) {
 
 bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
                          double most) {
-  return remembers(parameters) || are_about_the_size(parameters, start, most);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (!remembers(parameters, axis) && !is_about_the_size(parameters, start, axis, most))
+      return false;
+  return true;
+}
+
+bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, std::size_t axis) {
+  constexpr double kUncertain = 0.3;  // as a ratio
+  const auto own = static_cast<Eigen::Index>(axis);
+  const auto k = static_cast<Eigen::Index>(4 * axis) + own;
+  const double size_V_per_g =
+      std::max(std::abs(fit.parameters.twelve[axis](own)), std::abs(start.twelve[axis](own)));
+  return std::sqrt(fit.covariance(k, k)) < kUncertain * size_V_per_g;
 }
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {

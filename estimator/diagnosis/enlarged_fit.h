@@ -40,6 +40,10 @@ struct EnlargedFit : EnlargedEstimate {
 bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
                          double most);
 
+/// Whether the sensitivity of an axis to its own direction is known at all, against what it is and
+/// was. In a model that is complete it is, even beside creep.
+bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, std::size_t axis);
+
 /// Of a fit that is to settle.
 inline constexpr int kMostIterations = 20;
 

@@ -313,7 +313,7 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named&
     std::optional<Next> next =
         likeliest_beside(model, named, fit, most - names.size(), fit.chi2 + price - least_cost);
     if (!next) break;
-    fit = with_shapes_released(model, std::move(next->fit));
+    fit = model.looked_closer(with_shapes_released(model, std::move(next->fit)));
     price += model.price_in(fit, next->entry.candidate);
     next->entry.parameters = fit.parameters;
     names.push_back(std::move(next->entry));

@@ -263,10 +263,9 @@ void SearchModel::forget(std::size_t effect) {
   p_values_.erase(p_values_.begin() + static_cast<std::ptrdiff_t>(effect));
 }
 
-/// Puts one of those close to the newcomer in its place that explains clearly more.
-void SearchModel::look_closer() {
+EnlargedFit SearchModel::looked_closer(EnlargedFit fit) const {
   constexpr double kClearly = 10;
-  const ActiveEffect& newcomer = stage_.fit.parameters.effects.back();
+  const ActiveEffect& newcomer = fit.parameters.effects.back();
   const std::vector<Hypothesis> closer =
       newcomer.effect->closer(input_.log, newcomer.axis, {newcomer.p});
   std::vector<EnlargedFit> fits(closer.size());
@@ -277,7 +276,7 @@ void SearchModel::look_closer() {
     });
   };
   for (std::size_t k = 0; k < closer.size(); ++k) {
-    fits[k].parameters = stage_.fit.parameters;
+    fits[k].parameters = fit.parameters;
     fits[k].parameters.effects.back().p = closer[k].p;
   }
   // Of many, the best few are known before they have settled.
@@ -291,12 +290,17 @@ void SearchModel::look_closer() {
     fits.resize(std::min(fits.size(), kFew));
   }
   fit_all(kMostIterations);
-  const EnlargedFit* best = nullptr;
-  for (const EnlargedFit& with : fits)
-    if (with.determined && with.chi2 < stage_.fit.chi2 - kClearly &&
+  EnlargedFit* best = nullptr;
+  for (EnlargedFit& with : fits)
+    if (with.determined && with.chi2 < fit.chi2 - kClearly &&
         (best == nullptr || with.chi2 < best->chi2))
       best = &with;
-  if (best != nullptr) adopt(best->parameters);
+  return best != nullptr ? std::move(*best) : std::move(fit);
+}
+
+void SearchModel::look_closer() {
+  const EnlargedFit closer = looked_closer(stage_.fit);
+  if (closer.chi2 < stage_.fit.chi2) adopt(closer.parameters);
 }
 
 /// Leaves open what nothing recorded decides where that is clearly the likelier.

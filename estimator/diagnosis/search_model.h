@@ -71,6 +71,9 @@ class SearchModel {
   EnlargedFit fit_with(const CandidateGains& gains, std::size_t place, const Candidate& candidate,
                        double promised) const;
   EnlargedFit fit_without(const std::vector<std::size_t>& effects) const;
+  /// Such a fit with one of those close to its last effect (Effect::closer()) in its place, where
+  /// that explains clearly more.
+  EnlargedFit looked_closer(EnlargedFit fit) const;
   /// A candidate that may come into the model, and the model with it.
   struct Entry {
     std::size_t candidate = 0;

@@ -112,27 +112,36 @@ std::vector<std::size_t> drop_what_does_not_carry(const VisitLog& log, const Val
 }
 
 /// Effects with which the poses of an axis that were left out of the fit come out far worse than by
-/// the 12 parameters are none, however much more like noise they make the rest. Of those the one
-/// without which they come out best; nothing where none is.
-std::optional<std::size_t> what_worsens(const VisitLog& log, const std::vector<PoseMean>& poses,
+/// the 12 parameters are none, however much more like noise they make the rest; nor are those that
+/// leave its sensitivity unknown. Of them the one without which the poses come out best, and with
+/// which the sensitivity goes if one alone takes it; nothing where there are none.
+std::optional<std::size_t> what_worsens(const SearchInput& search,
+                                        const std::vector<PoseMean>& poses,
                                         const SearchResult& found,
                                         const PerAxis<double>& before_mps2) {
   constexpr double kFar = 2;  // slow noise alone may make it worse by a little
   if (found.evidence.empty()) return {};
+  const VisitLog& log = search.log;
   const Validation validation(log, poses, found);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    if (!(validation.rms_mps2(found.fit, axis) > kFar * before_mps2[axis])) continue;
+    const bool is_known = knows_sensitivity(found.fit, search.start, axis);
+    if (is_known && !(validation.rms_mps2(found.fit, axis) > kFar * before_mps2[axis])) continue;
     std::optional<std::size_t> worst;
+    bool worst_takes_it = false;
     double least_mps2 = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < found.evidence.size(); ++k) {
       const ActiveEffect& active = found.fit.parameters.effects[k];
       if (active.effect->subject() != Subject::sensor || active.axis != axis ||
           active.effect->certain(log, axis))
         continue;
-      const double left_mps2 = validation.rms_mps2(validation.fit_without(k), axis);
-      if (!worst || left_mps2 < least_mps2) {
+      const EnlargedFit without = validation.fit_without(k);
+      const bool takes_it = !is_known && knows_sensitivity(without, search.start, axis);
+      if (worst_takes_it && !takes_it) continue;
+      const double left_mps2 = validation.rms_mps2(without, axis);
+      if (!worst || (takes_it && !worst_takes_it) || left_mps2 < least_mps2) {
         least_mps2 = left_mps2;
         worst = k;
+        worst_takes_it = takes_it;
       }
     }
     if (worst) return worst;
@@ -154,10 +163,10 @@ void search_past_what_worsens(const SearchInput& search, const std::vector<PoseM
                       return candidate.family == family;
                     });
     found = search_effects(search, result.candidates, options);
-    worst = what_worsens(search.log, poses, found, before_mps2);
+    worst = what_worsens(search, poses, found, before_mps2);
     if (!worst) return;
   }
-  for (; worst; worst = what_worsens(search.log, poses, found, before_mps2)) {
+  for (; worst; worst = what_worsens(search, poses, found, before_mps2)) {
     found.remove(*worst);
     found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
   }

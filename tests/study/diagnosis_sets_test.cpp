@@ -151,6 +151,33 @@ TEST(DiagnosisSets, AStuckBitOfACoarseConverterIsTheOnlyFinding) {
   EXPECT_LT(outcome.after.fresh, 1.5 * outcome.oracle.fresh);
 }
 
+// In raster order a_z changes nine times. A polynomial of the way since the previous pose left
+// K_zz open, 45 ± 33 mV/g, and was off by 400 times the noise on fresh poses.
+TEST(DiagnosisSets, BesideMemoryASensitivityIsStillKnown) {
+  const SetOutcome outcome = run_set({.seed = 1310005,
+                                      .effects = {"sensor.settling"},
+                                      .size = 1,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::white,
+                                      .bits = 12,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  expect_only_finding(outcome);
+  EXPECT_LT(outcome.after.fresh, 1.2 * outcome.told_fresh);
+}
+
+// While the temperature falls, a step in it says when within the dwell the bias jumped.
+TEST(DiagnosisSets, AStepWithinADwellIsNamedAheadOfOneInTheTemperature) {
+  expect_only_finding(run_set({.seed = 1310007,
+                               .effects = {"sensor.bias_step"},
+                               .size = 10,
+                               .order = sim::RecordOrder::snake,
+                               .noise = NoiseKind::white,
+                               .bits = 16,
+                               .samples_per_pose = 50,
+                               .static_s = 300}));
+}
+
 // The step falls between two rings: as well one in a_z, at which U_z0 lies half a step higher.
 TEST(DiagnosisSets, WhatAStepMayBeAsWellIsInTheUncertainty) {
   const SetOutcome outcome = run_set({.seed = 1310002,
