@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -19,15 +20,23 @@ constexpr Eigen::Index kMostSpans = 160;
 constexpr std::size_t kFewestSamples = 8;  // of a span
 // Of −2 ln L: one column in a thousand that has nothing to do with the record.
 constexpr double kClearly = 11;
+// What an answer must gain besides that is one of many.
+constexpr double kPriceOfShape = 13;
+constexpr std::size_t kMostTaken = 4;
+constexpr std::size_t kShapesRefined = 4;
 
 using Values = Eigen::Map<const Eigen::VectorXd>;
 
-/// A column at the record's samples.
+/// How an output may answer to a column: its values, at an even step, in; the answer out.
+using Answer = std::function<Eigen::VectorXd(const Eigen::VectorXd&)>;
+
+/// An answer to a column at the record's samples.
 struct Column {
   std::string name;
-  const double* first = nullptr;
-  double level = 0;      ///< mean over the record
-  Eigen::VectorXd mean;  ///< of each span, about that
+  Answer answer;
+  double price = 0;
+  Eigen::VectorXd value;  ///< of the column, at the samples
+  Eigen::VectorXd mean;   ///< of the answer over each span, about its own mean
 };
 
 /// Spans of equal length that cover the record but for a rest of less than one.
@@ -39,7 +48,59 @@ struct Spans {
   }
 };
 
-/// Those that change in the record.
+Eigen::VectorXd line(const Eigen::VectorXd& x) { return x; }
+
+/// Follows the column once that has moved on by the play; `start`: where in it, −1 to 1.
+Answer play(double width, double start) {
+  return [=](const Eigen::VectorXd& x) {
+    Eigen::VectorXd y(x.size());
+    double at = x(0) + 0.5 * start * width;
+    for (Eigen::Index k = 0; k < x.size(); ++k)
+      y(k) = at = std::clamp(at, x(k) - 0.5 * width, x(k) + 0.5 * width);
+    return y;
+  };
+}
+
+/// The average of the column's past, exponential over a share of the record.
+Eigen::VectorXd past(const Eigen::VectorXd& x, double share) {
+  const double keep = std::exp(-1 / (share * static_cast<double>(x.size())));
+  Eigen::VectorXd y(x.size());
+  double at = x(0);
+  for (Eigen::Index k = 0; k < x.size(); ++k) y(k) = at = x(k) + (at - x(k)) * keep;
+  return y;
+}
+
+/// Those that are no straight line, for a column with these means of the spans.
+std::vector<Answer> shapes_of(const Eigen::VectorXd& mean) {
+  std::vector<Answer> answers;
+  Eigen::VectorXd sorted = mean;
+  std::sort(sorted.begin(), sorted.end());
+  const double range = sorted(sorted.size() - 1) - sorted(0);
+  for (const double share : {0.15, 0.3, 0.45, 0.6, 0.75})
+    for (const double start : {-1.0, 0.0, 1.0}) answers.push_back(play(share * range, start));
+  for (const double share : {0.02, 0.05, 0.1, 0.2, 0.4}) {
+    answers.push_back([=](const Eigen::VectorXd& x) { return past(x, share); });
+    answers.push_back(
+        [=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - past(x, share)); });
+  }
+  for (const double quantile : {0.15, 0.3, 0.5, 0.7, 0.85}) {
+    const double at =
+        sorted(static_cast<Eigen::Index>(quantile * static_cast<double>(sorted.size())));
+    answers.push_back(
+        [=](const Eigen::VectorXd& x) { return Eigen::VectorXd((x.array() > at).cast<double>()); });
+    answers.push_back(
+        [=](const Eigen::VectorXd& x) { return Eigen::VectorXd((x.array() - at).cwiseMax(0)); });
+  }
+  const double middle = mean.mean();
+  answers.push_back(
+      [=](const Eigen::VectorXd& x) { return Eigen::VectorXd((x.array() - middle).square()); });
+  return answers;
+}
+
+Eigen::VectorXd centred(const Eigen::VectorXd& x) { return x.array() - x.mean(); }
+
+/// Answers to those that change in the record. Of shapes the mean of the answer is for now that to
+/// the means.
 std::vector<Column> columns_of(const SampleTable& table, std::size_t first, Eigen::Index count,
                                const Spans& spans) {
   std::vector<Column> columns;
@@ -47,9 +108,14 @@ std::vector<Column> columns_of(const SampleTable& table, std::size_t first, Eige
     if (values.empty()) return;
     const Values value(values.data() + first, count);
     if (!value.allFinite()) return;
-    const double level = value.mean();
-    const Eigen::VectorXd mean = spans.means(value).array() - level;
-    if (mean.maxCoeff() > mean.minCoeff()) columns.push_back({name, value.data(), level, mean});
+    const Eigen::VectorXd mean = spans.means(value);
+    if (!(mean.maxCoeff() > mean.minCoeff())) return;
+    columns.push_back({name, line, 0, value, centred(mean)});
+    for (Answer& shape : shapes_of(mean)) {
+      Eigen::VectorXd answer = centred(shape(mean));
+      if (answer.maxCoeff() > answer.minCoeff())
+        columns.push_back({name, std::move(shape), kPriceOfShape, value, std::move(answer)});
+    }
   };
   add("temp_C", table.temp_C);
   for (const Covariate& covariate : table.covariates) add(covariate.name, covariate.value);
@@ -74,6 +140,36 @@ bool is_worth_a_look(const Eigen::MatrixXd& design, const Eigen::VectorXd& mean,
   const double share =
       left.dot(other) * left.dot(other) / (left.squaredNorm() * other.squaredNorm());
   return -static_cast<double>(mean.size()) * std::log1p(-std::min(share, 1.0)) > kClearly;
+}
+
+/// Of shapes the few that promise most in this noise, with their answers at the samples.
+std::vector<Column> likeliest_shapes(const std::vector<Column>& columns, const PooledNoise& noise,
+                                     const Eigen::MatrixXd& design, const Eigen::VectorXd& mean,
+                                     const Spans& spans) {
+  const Eigen::LLT<Eigen::MatrixXd> factor(noise.covariance);
+  const Eigen::MatrixXd white_design = factor.matrixL().solve(design);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(white_design);
+  const auto left_of = [&](const Eigen::VectorXd& v) {
+    const Eigen::VectorXd white = factor.matrixL().solve(v);
+    return Eigen::VectorXd(white - white_design * qr.solve(white));
+  };
+  const Eigen::VectorXd left = left_of(mean);
+  std::vector<std::pair<double, const Column*>> promised;
+  for (const Column& column : columns) {
+    if (column.price == 0 || !is_worth_a_look(design, mean, column.mean)) continue;
+    const Eigen::VectorXd other = left_of(column.mean);
+    const double square = other.squaredNorm();
+    if (square > 0) promised.emplace_back(-left.dot(other) * left.dot(other) / square, &column);
+  }
+  std::sort(promised.begin(), promised.end());
+  std::vector<Column> likeliest;
+  for (const auto& [gain, column] : promised) {
+    if (likeliest.size() == kShapesRefined) break;
+    likeliest.push_back(*column);
+    const Eigen::VectorXd answer = column->answer(column->value);
+    likeliest.back().mean = centred(spans.means(Values(answer.data(), answer.size())));
+  }
+  return likeliest;
 }
 
 Eigen::MatrixXd with_column(const Eigen::MatrixXd& design, const Eigen::VectorXd& column) {
@@ -114,30 +210,40 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   Eigen::MatrixXd design = Eigen::VectorXd::Ones(spans.count);
   std::vector<Column> followed;
   std::optional<PooledNoise> so_far;
-  while (!columns.empty()) {
+  while (followed.size() < kMostTaken) {
+    if (std::none_of(columns.begin(), columns.end(), [&](const Column& column) {
+          return is_worth_a_look(design, mean, column.mean);
+        }))
+      break;
+    if (!so_far) so_far = pool.pool(mean, design);
+    std::vector<Column> possible = likeliest_shapes(columns, *so_far, design, mean, spans);
+    for (const Column& column : columns)
+      if (column.price == 0 && is_worth_a_look(design, mean, column.mean))
+        possible.push_back(column);
     std::optional<PooledNoise> best;
-    auto which = columns.end();
-    for (auto column = columns.begin(); column != columns.end(); ++column) {
-      if (!is_worth_a_look(design, mean, column->mean)) continue;
-      if (!so_far) so_far = pool.pool(mean, design);
-      PooledNoise found = pool.pool(mean, with_column(design, column->mean), &so_far->power);
-      if (best && best->likelihood_deviance <= found.likelihood_deviance) continue;
+    const Column* which = nullptr;
+    for (const Column& column : possible) {
+      PooledNoise found = pool.pool(mean, with_column(design, column.mean), &so_far->power);
+      if (best &&
+          best->likelihood_deviance + which->price <= found.likelihood_deviance + column.price)
+        continue;
       best = std::move(found);
-      which = column;
+      which = &column;
     }
-    if (!best || best->likelihood_deviance > so_far->likelihood_deviance - kClearly) break;
+    if (!best || best->likelihood_deviance + which->price > so_far->likelihood_deviance - kClearly)
+      break;
     design = with_column(design, which->mean);
-    followed.push_back(std::move(*which));
-    columns.erase(which);
+    followed.push_back(*which);
     so_far = std::move(best);
   }
   std::vector<std::string> names;
   if (followed.empty()) return names;
   const Eigen::VectorXd coefficients = coefficients_in(*so_far, design, mean);
   for (std::size_t k = 0; k < followed.size(); ++k) {
-    u.array() -= coefficients(static_cast<Eigen::Index>(k) + 1) *
-                 (Values(followed[k].first, u.size()).array() - followed[k].level);
-    names.push_back(followed[k].name);
+    u -= coefficients(static_cast<Eigen::Index>(k) + 1) *
+         centred(followed[k].answer(followed[k].value));
+    if (std::find(names.begin(), names.end(), followed[k].name) == names.end())
+      names.push_back(followed[k].name);
   }
   return names;
 }

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 #include <string>
 #include <vector>
@@ -68,6 +70,33 @@ TEST(RecordColumns, WhatFollowsAColumnIsTakenOut) {
   for (std::size_t k = 0; k < kSamples; ++k)
     square += std::pow(record[k] - noise[k] - mean, 2) / kSamples;
   EXPECT_LT(std::sqrt(square), 4 * kWhite_V / std::sqrt(kSamples));
+}
+
+/// What takes out of white noise all that `follows` the temperature does, and names the column.
+void expect_no_walk_left(unsigned seed, const std::function<double(double)>& follows) {
+  Draw draw(seed);
+  const SampleTable table = table_with(draw.walk(0.01), draw.walk(0.001));
+  std::vector<double> record = draw.white(kWhite_V);
+  for (std::size_t k = 0; k < kSamples; ++k) record[k] += follows(table.temp_C[k]);
+  const NoiseModel before = identify_noise(record, 1 / kStep_s);
+  ASSERT_TRUE(before.K.present || before.R.present);
+  EXPECT_EQ(take_out_columns(record, table, 0, kStep_s), std::vector<std::string>{"temp_C"});
+  const NoiseModel after = identify_noise(record, 1 / kStep_s);
+  EXPECT_LT(after.K.value, 0.35 * before.K.value);
+}
+
+TEST(RecordColumns, PlayInTheTemperatureIsTakenOut) {
+  expect_no_walk_left(5, [at = 0.0](double temp_C) mutable {
+    at = std::clamp(at, temp_C - 0.2, temp_C + 0.2);
+    return 2e-3 * at;
+  });
+}
+
+TEST(RecordColumns, WhatLagsBehindTheTemperatureIsTakenOut) {
+  expect_no_walk_left(6, [past = 0.0](double temp_C) mutable {
+    past += (temp_C - past) * kStep_s / 60;
+    return 2e-3 * past;
+  });
 }
 
 TEST(RecordColumns, TwoColumnsBesideARandomWalk) {
