@@ -133,6 +133,7 @@ struct NotFound {
   std::string parameter;
   double limit = 0;
   std::string unit;
+  double worst = 0;  ///< of a bit: the highest that would show on all of the axes
 };
 
 /// Whether it may be there in the place of something that was found.
@@ -154,9 +155,10 @@ std::vector<NotFound> not_found_rows(const Diagnosis& diagnosis) {
       return r.id == limit.id && r.parameter == limit.parameter && r.unit == limit.unit;
     });
     if (row == rows.end())
-      row = rows.insert(rows.end(), {limit.id, {}, limit.parameter, 0, limit.unit});
+      row = rows.insert(rows.end(), {limit.id, {}, limit.parameter, 0, limit.unit, limit.worst});
     if (limit.axis) row->axes.push_back(*limit.axis);
     row->limit = std::max(row->limit, limit.limit);
+    row->worst = std::min(row->worst, limit.worst);
   }
   return rows;
 }
@@ -172,9 +174,10 @@ void add_not_found(const Composer& c) {
   table.word_columns = {1, 2};
   for (const NotFound& item : rows) {
     const std::string unit = printed_unit(item.unit);
-    table.rows.push_back({effect_name(item.id, c.tr),
-                          item.axes.empty() ? "–" : axes_text(item.axes), item.parameter,
-                          significant(item.limit, 2) + before_unit(unit) + unit});
+    table.rows.push_back(
+        {effect_name(item.id, c.tr), item.axes.empty() ? "–" : axes_text(item.axes), item.parameter,
+         item.id == "adc.stuck_bit" ? fmt::format("{:.0f} … {:.0f}", item.limit, item.worst)
+                                    : significant(item.limit, 2) + before_unit(unit) + unit});
   }
   c.add(std::move(table));
 }

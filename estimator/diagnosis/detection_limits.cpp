@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "estimator/diagnosis/screening.h"
+#include "estimator/effects/code_evidence.h"
 
 namespace plumbline {
 namespace {
@@ -210,6 +211,43 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
            transforms.push_back(closer_gains.transform(c));
          return transforms;
        }});
+}
+
+void add_limits_of_samples(const MeasurementSet& run, const VisitLog& log,
+                           const PerAxis<double>& K_V_per_g, const std::vector<FoundEffect>& found,
+                           std::vector<DetectionLimit>& limits) {
+  constexpr double kChance = 1e-6;
+  const auto add = [&](const char* id, std::size_t axis, const char* parameter, double limit,
+                       double worst, const char* unit) {
+    const auto has_axis = [&](const FoundEffect& other) {
+      return other.id == id &&
+             std::find(other.axes.begin(), other.axes.end(), axis) != other.axes.end();
+    };
+    const auto is_there = [&](const DetectionLimit& other) {
+      return other.id == id && other.axis == axis;
+    };
+    if (std::none_of(found.begin(), found.end(), has_axis) &&
+        std::none_of(limits.begin(), limits.end(), is_there))
+      limits.push_back({id, axis, parameter, limit, limit, worst, unit});
+  };
+  const auto samples = static_cast<double>(run.samples.size());
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const double step_V = log.step_V(axis);
+    const double sd_V = std::hypot(log.input_sd_V[axis], step_V / std::sqrt(12.0));
+    const double u_g = std::sqrt(2 / samples) * sd_V / std::abs(K_V_per_g[axis]);
+    add("adc.mains_pickup", axis, "amplitude", kSigmas * u_g, kSigmas * u_g, "g");
+    if (!log.adc) continue;
+    const std::vector<std::int64_t> codes = codes_seen(run.samples.u_V[axis], *log.adc);
+    const double steps = std::ceil(std::pow(kChance, -1 / static_cast<double>(codes.size())));
+    add("adc.quantization", axis, "lsb", std::max(2.0, steps) * step_V,
+        std::max(2.0, steps) * step_V, "V");
+    // Twice the period of the highest of them fits into the range.
+    const double range = static_cast<double>(codes.back() - codes.front() + 1);
+    const double highest = std::floor(std::log2(range / 4));
+    if (highest >= 0) add("adc.stuck_bit", axis, "bit", 0, highest, "");
+  }
+  std::stable_sort(limits.begin(), limits.end(),
+                   [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
 }
 
 }  // namespace plumbline

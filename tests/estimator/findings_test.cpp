@@ -248,6 +248,18 @@ TEST(DetectionLimits, StandForEverythingThatWasNotFound) {
   ASSERT_NE(clipped, nullptr);
   EXPECT_GT(clipped->limit, 0.8);
   EXPECT_LT(clipped->limit, 1.001);
+  // A line in 60 dwells of 20 samples with 0.3 mV, and what the codes show.
+  const DetectionLimit* pickup = limit_of(result, "adc.mains_pickup", 0, "amplitude");
+  ASSERT_NE(pickup, nullptr);
+  const double line_g = 5 * std::sqrt(2.0 / 1200) * 3e-4 / 0.032;
+  EXPECT_NEAR(pickup->limit, line_g, 0.15 * line_g);
+  const DetectionLimit* coarser = limit_of(result, "adc.quantization", 0, "lsb");
+  ASSERT_NE(coarser, nullptr);
+  EXPECT_NEAR(coarser->limit, 2 * kSixteenBits.lsb_V(), 1e-9);
+  const DetectionLimit* stuck = limit_of(result, "adc.stuck_bit", 0, "bit");
+  ASSERT_NE(stuck, nullptr);
+  EXPECT_EQ(stuck->limit, 0);
+  EXPECT_EQ(stuck->worst, 7);  // 64 mV are 840 steps
   // A warm-up that is over before the first pose, 61 s in, may be of any size: the limit is of what
   // the run can still show.
   const DetectionLimit* warmup = limit_of(result, "sensor.warmup", 0, "b");
