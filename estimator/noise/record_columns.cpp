@@ -35,8 +35,10 @@ struct Column {
   std::string name;
   Answer answer;
   double price = 0;
-  Eigen::VectorXd value;  ///< of the column, at the samples
-  Eigen::VectorXd mean;   ///< of the answer over each span, about its own mean
+  Values value;          ///< of the column, at the samples
+  Eigen::VectorXd mean;  ///< of the answer over each span, about its own mean
+
+  Eigen::VectorXd at_samples() const { return answer(value); }
 };
 
 /// Spans of equal length that cover the record but for a rest of less than one.
@@ -166,7 +168,7 @@ std::vector<Column> likeliest_shapes(const std::vector<Column>& columns, const P
   for (const auto& [gain, column] : promised) {
     if (likeliest.size() == kShapesRefined) break;
     likeliest.push_back(*column);
-    const Eigen::VectorXd answer = column->answer(column->value);
+    const Eigen::VectorXd answer = column->at_samples();
     likeliest.back().mean = centred(spans.means(Values(answer.data(), answer.size())));
   }
   return likeliest;
@@ -240,8 +242,7 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   if (followed.empty()) return names;
   const Eigen::VectorXd coefficients = coefficients_in(*so_far, design, mean);
   for (std::size_t k = 0; k < followed.size(); ++k) {
-    u -= coefficients(static_cast<Eigen::Index>(k) + 1) *
-         centred(followed[k].answer(followed[k].value));
+    u -= coefficients(static_cast<Eigen::Index>(k) + 1) * centred(followed[k].at_samples());
     if (std::find(names.begin(), names.end(), followed[k].name) == names.end())
       names.push_back(followed[k].name);
   }
