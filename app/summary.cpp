@@ -7,6 +7,7 @@
 
 #include "app/certificate/rounding.h"
 #include "estimator/decision.h"
+#include "estimator/parameter_name.h"
 #include "estimator/shifted_parameters.h"
 
 namespace plumbline::app {
@@ -88,9 +89,8 @@ std::string error_rows(const Calibration& calibration,
 std::string shifted_line(const Calibration& calibration) {
   std::string text;
   for (const ShiftedParameter& p : shifted_parameters(calibration)) {
-    const double uncertainties = std::abs(p.after - p.before) / (kCoverageFactor * p.u);
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", parameter_name(p.axis, p.column),
-                        significant(uncertainties, 2));
+                        significant(std::abs(p.in_expanded_u()), 2));
   }
   return text.empty() ? text : "changed by the added effects, in multiples of U: " + text + '\n';
 }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "estimator/decision.h"
+#include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/explain.h"
 #include "estimator/diagnosis/noise_drivers.h"
 #include "estimator/diagnosis/residual_test.h"
@@ -443,6 +444,8 @@ Calibration calibrate_in_noise(const FurtherNoise& further, const PreparedRun& r
       u_worst_mps2 = explained->u_worst_mps2;
       certified = std::move(explained->estimate);
     }
+    add_limits_of_samples(input.run, *log, result.final.batch_ls, result.diagnosis.effects,
+                          result.diagnosis.not_found);
   }
   result.uncertainty =
       propagate_uncertainty(certified, input.run.poses, input.description, options.seed);

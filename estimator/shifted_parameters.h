@@ -2,15 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <string>
+#include <cmath>
 #include <vector>
 
 #include "estimator/calibrate.h"
 
 namespace plumbline {
-
-/// "K_xy"; column 3: "U_x0".
-std::string parameter_name(std::size_t axis, Eigen::Index column);
 
 /// A parameter that is another beside the added effects than by the twelve alone.
 struct ShiftedParameter {
@@ -19,6 +16,9 @@ struct ShiftedParameter {
   double before = 0;        ///< estimates.batch_ls
   double after = 0;         ///< final.batch_ls
   double u = 0;             ///< of `after`
+
+  double expanded_u() const { return 2 * u; }
+  double in_expanded_u() const { return (after - before) / expanded_u(); }
 };
 
 /// Those that moved by more than their expanded uncertainty, k = 2, in the order x, y, z; none

@@ -10,6 +10,7 @@
 #include "app/certificate/rounding.h"
 #include "estimator/decision.h"
 #include "estimator/noise/chi_squared.h"
+#include "estimator/parameter_name.h"
 #include "estimator/shifted_parameters.h"
 
 namespace plumbline::app::content {
@@ -118,10 +119,9 @@ void add_shifted(const Composer& c) {
   table.header = {c.tr("parameter"), c.tr("twelve parameters alone"),
                   c.tr("with the added effects"), c.tr("change in U")};
   for (const ShiftedParameter& p : shifted) {
-    const double U = 2e3 * p.u;
+    const double U = 1e3 * p.expanded_u();
     table.rows.push_back({parameter_name(p.axis, p.column), round_result(1e3 * p.before, U).value,
-                          round_result(1e3 * p.after, U).value,
-                          significant(1e3 * (p.after - p.before) / U, 2)});
+                          round_result(1e3 * p.after, U).value, significant(p.in_expanded_u(), 2)});
   }
   c.add(std::move(table));
 }

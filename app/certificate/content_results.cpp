@@ -8,7 +8,7 @@
 #include "app/certificate/figures.h"
 #include "app/certificate/rounding.h"
 #include "app/certificate/sensor_terms.h"
-#include "estimator/shifted_parameters.h"
+#include "estimator/parameter_name.h"
 
 namespace plumbline::app::content {
 namespace {
@@ -175,18 +175,16 @@ void add_budget_rows(const Composer& c, const Budget& budget, Table& table) {
   for (const BudgetLine& line : budget.lines) {
     // What cannot matter is left out: gravity acts on no offset.
     if (offset && line.source == BudgetSource::gravity) continue;
-    const bool alternatives = line.source == BudgetSource::alternatives;
-    const bool readings = line.source == BudgetSource::readings;
     const bool gravity = line.source == BudgetSource::gravity;
-    const bool own_unit = readings || alternatives;  // that of the parameter
+    const bool own_unit = line.source == BudgetSource::readings ||
+                          line.source == BudgetSource::alternatives;  // that of the parameter
     const std::string input_unit = own_unit ? unit : gravity ? "m/s²" : "″";
     const double scale = own_unit ? 1e3 : 1;
     table.rows.push_back(
         {first ? name : "", source_name(c, line.source),
-         readings       ? significant(scale * line.estimate, 6) + " " + unit
-         : gravity      ? significant(line.estimate, 7) + " m/s²"
-         : alternatives ? "0 " + unit
-                        : "0″",
+         own_unit  ? significant(scale * line.estimate, 6) + " " + unit
+         : gravity ? significant(line.estimate, 7) + " m/s²"
+                   : "0″",
          c.tr("normal"),
          significant(scale * line.u, 2) + (input_unit == "″" ? "" : " ") + input_unit,
          degrees_of_freedom(line.dof), own_unit ? "1" : significant(1e3 * line.sensitivity, 2),

@@ -13,12 +13,13 @@
 #include "app/certificate/rounding.h"
 #include "app/figure/allan_figure.h"
 #include "app/figure/plot.h"
-#include "estimator/shifted_parameters.h"
+#include "estimator/parameter_name.h"
 
 namespace plumbline::app {
 namespace {
 
-/// From dark to light, so that the parts of a bar stay apart without colour.
+/// From dark to light, so that the parts of a bar stay apart without colour; what few have, last,
+/// stands darker beside the lightest.
 constexpr std::array kPartColors = {"#08519c", "#d55e00", "#e8b35a", "#d9d9d9", "#009e73"};
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "app/io/diagnosis_json.h"
 #include "app/io/uncertainty_json.h"
+#include "estimator/parameter_name.h"
 #include "estimator/shifted_parameters.h"
 
 namespace plumbline::app {
@@ -67,7 +68,7 @@ Json quantization_json(const Calibration& calibration) {
   });
 }
 
-Json diagnosis_json(const Calibration& calibration) {
+Json diagnosis_and_shifted(const Calibration& calibration) {
   Json json = json_diagnosis(calibration.diagnosis);
   Json shifted = Json::array();
   for (const ShiftedParameter& p : shifted_parameters(calibration))
@@ -111,7 +112,7 @@ Json result_json(const Calibration& calibration, const Provenance& provenance) {
           {"estimates", to_json(calibration.estimates)},
           {"uncertainty",
            calibration.uncertainty ? uncertainty_json(*calibration.uncertainty) : Json(nullptr)},
-          {"diagnosis", diagnosis_json(calibration)},
+          {"diagnosis", diagnosis_and_shifted(calibration)},
           {"final", to_json(calibration.final)},
           {"error", json_error(calibration)},
           {"decision", json_decision(calibration.decision)}};

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "estimator/shifted_parameters.h"
+#include "estimator/parameter_name.h"
 
 namespace plumbline::app {
 

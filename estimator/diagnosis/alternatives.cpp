@@ -43,12 +43,12 @@ bool same_effect(const Candidate& a, const Candidate& b) {
   return a.effect == b.effect && (a.effect->subject() == Subject::head || a.axis == b.axis);
 }
 
-/// Schwarz's approximation of the odds of a rival.
-double odds_of(const EnlargedFit& rival, const SearchResult& result) {
+/// With Schwarz's approximation of its odds.
+Alternative alternative(std::string name, EnlargedFit rival, const EnlargedFit& found) {
   const auto further =
-      static_cast<double>(rival.parameters.free_count() - result.fit.parameters.free_count());
-  const double behind = rival.chi2 - result.fit.chi2 + kPricePerParameter * further;
-  return std::exp(-0.5 * std::max(0.0, behind));
+      static_cast<double>(rival.parameters.free_count() - found.parameters.free_count());
+  const double behind = rival.chi2 - found.chi2 + kPricePerParameter * further;
+  return {std::move(name), std::move(rival), std::exp(-0.5 * std::max(0.0, behind))};
 }
 
 /// By how much the free parameters of `found` are others in a model with something else in the
@@ -80,9 +80,8 @@ std::vector<Alternative> proven_rivals(const SearchInput& input, const Candidate
       continue;
     EnlargedFit fit = fit_from_levels(input.log, result.observed, result.whitening,
                                       with_effect(base, candidate.active()));
-    if (!fit.determined) continue;
-    const double odds = odds_of(fit, result);
-    rivals.push_back({candidate.effect->id(), std::move(fit), odds});
+    if (fit.determined)
+      rivals.push_back(alternative(candidate.effect->id(), std::move(fit), result.fit));
   }
   return rivals;
 }
@@ -108,9 +107,8 @@ std::optional<Alternative> field_of_room(const SearchInput& input, const Candida
     }
     if (with.effects.size() == base.effects.size()) continue;
     EnlargedFit fit = fit_enlarged(input.log, result.observed, result.whitening, with);
-    if (!fit.determined || fit.chi2 > result.fit.chi2 + kIndistinguishable) continue;
-    const double odds = odds_of(fit, result);
-    return Alternative{field->effect->id(), std::move(fit), odds};
+    if (fit.determined && fit.chi2 <= result.fit.chi2 + kIndistinguishable)
+      return alternative(field->effect->id(), std::move(fit), result.fit);
   }
   return {};
 }
@@ -159,10 +157,8 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
     const std::string id = list.candidates[refined[k].candidate].effect->id();
     if (id != found.effect->id() &&
         std::none_of(singles.begin(), singles.end(),
-                     [&](const Alternative& s) { return s.name == id; })) {
-      const double odds = odds_of(fits[k], result);
-      singles.push_back({id, std::move(fits[k]), odds});
-    }
+                     [&](const Alternative& s) { return s.name == id; }))
+      singles.push_back(alternative(id, std::move(fits[k]), result.fit));
   }
   std::stable_sort(singles.begin(), singles.end(), [](const Alternative& a, const Alternative& b) {
     return a.fit.chi2 < b.fit.chi2;
@@ -201,7 +197,7 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
     std::string name;
     for (const std::string& id : ids) name += (name.empty() ? "" : "+") + id;
-    return {{name, fit, odds_of(fit, result)}};
+    return {alternative(name, fit, result.fit)};
   }
   return {};
 }

@@ -107,6 +107,11 @@ struct Size {
   }
 };
 
+void sort_by_id(std::vector<DetectionLimit>& limits) {
+  std::stable_sort(limits.begin(), limits.end(),
+                   [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
+}
+
 /// Of an effect without amplitude.
 double size_sigmas(const Eigen::MatrixXd& transform) {
   return transform.rows() == 0 ? 0 : 1 / transform(0, 0);
@@ -179,8 +184,7 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
         limit_of(*size.first, size.first->effect->parameters().front(), {size.limit()}));
   }
   for (DetectionLimit& limit : limits) limit.sigmas = sigmas_of(log_p[{limit.id, limit.axis}]);
-  std::stable_sort(limits.begin(), limits.end(),
-                   [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
+  sort_by_id(limits);
   return limits;
 }
 
@@ -214,7 +218,7 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
 }
 
 void add_limits_of_samples(const MeasurementSet& run, const VisitLog& log,
-                           const PerAxis<double>& K_V_per_g, const std::vector<FoundEffect>& found,
+                           const TriadEstimate& model, const std::vector<FoundEffect>& found,
                            std::vector<DetectionLimit>& limits) {
   constexpr double kChance = 1e-6;
   const auto add = [&](const char* id, std::size_t axis, const char* parameter, double limit,
@@ -234,20 +238,18 @@ void add_limits_of_samples(const MeasurementSet& run, const VisitLog& log,
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const double step_V = log.step_V(axis);
     const double sd_V = std::hypot(log.input_sd_V[axis], step_V / std::sqrt(12.0));
-    const double u_g = std::sqrt(2 / samples) * sd_V / std::abs(K_V_per_g[axis]);
-    add("adc.mains_pickup", axis, "amplitude", kSigmas * u_g, kSigmas * u_g, "g");
+    const double K_V_per_g = std::abs(model[axis].value(static_cast<Eigen::Index>(axis)));
+    const double limit_g = kSigmas * std::sqrt(2 / samples) * sd_V / K_V_per_g;
+    add("adc.mains_pickup", axis, "amplitude", limit_g, limit_g, "g");
     if (!log.adc) continue;
     const std::vector<std::int64_t> codes = codes_seen(run.samples.u_V[axis], *log.adc);
-    const double steps = std::ceil(std::pow(kChance, -1 / static_cast<double>(codes.size())));
-    add("adc.quantization", axis, "lsb", std::max(2.0, steps) * step_V,
-        std::max(2.0, steps) * step_V, "V");
-    // Twice the period of the highest of them fits into the range.
-    const double range = static_cast<double>(codes.back() - codes.front() + 1);
-    const double highest = std::floor(std::log2(range / 4));
-    if (highest >= 0) add("adc.stuck_bit", axis, "bit", 0, highest, "");
+    const double steps =
+        std::max(2.0, std::ceil(std::pow(kChance, -1 / static_cast<double>(codes.size()))));
+    add("adc.quantization", axis, "lsb", steps * step_V, steps * step_V, "V");
+    const int bits = bits_that_would_show(codes, *log.adc);
+    if (bits > 0) add("adc.stuck_bit", axis, "bit", 0, bits - 1, "");
   }
-  std::stable_sort(limits.begin(), limits.end(),
-                   [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
+  sort_by_id(limits);
 }
 
 }  // namespace plumbline

@@ -36,10 +36,9 @@ std::vector<DetectionLimit> detection_limits(const SearchInput& input, const Can
 /// uncertainties of its amplitude in white noise, √(2σ²/N); the declared steps that a coarser one
 /// has to hold for its gaps among m codes to be no chance (coarser_lattice()); the bits, from
 /// `best` to `worst`, that would be seen not to change (stuck_bits()). A bit has no size: `limit`
-/// is the lowest. Without a declared converter the sine alone. K_V_per_g: own sensitivity of each
-/// axis.
+/// is the lowest. Without a declared converter the sine alone. model: for the sensitivities.
 void add_limits_of_samples(const MeasurementSet& run, const VisitLog& log,
-                           const PerAxis<double>& K_V_per_g, const std::vector<FoundEffect>& found,
+                           const TriadEstimate& model, const std::vector<FoundEffect>& found,
                            std::vector<DetectionLimit>& limits);
 
 }  // namespace plumbline

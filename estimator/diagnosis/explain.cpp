@@ -208,16 +208,9 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     add_noise(input.noise_follows, model, diagnosis);
     add_noise(wanders_beyond_record(search, found), model, diagnosis);
   };
-  const auto add_sampled = [&](Diagnosis& diagnosis, const EnlargedParameters& model) {
-    PerAxis<double> K_V_per_g;
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      K_V_per_g[i] = model.twelve[i](static_cast<Eigen::Index>(i));
-    add_limits_of_samples(input.input.run, log, K_V_per_g, diagnosis.effects, diagnosis.not_found);
-  };
   const auto without_effects = [&]() -> std::optional<Explained> {
     result.schwarz_criterion = schwarz_criterion(found);
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
-    add_sampled(result.diagnosis, start);
     add_noise_to(result.diagnosis, {});
     return std::nullopt;
   };
@@ -350,7 +343,6 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   diagnosis.axis_test = result.diagnosis.axis_test;
   add_noise_to(diagnosis, found.fit.parameters);
   diagnosis.reason = reason_of_findings(residual, diagnosis.reason, result.after.fit_pose_rms_mps2);
-  add_sampled(diagnosis, found.fit.parameters);
   result.diagnosis = std::move(diagnosis);
   return explained;
 }

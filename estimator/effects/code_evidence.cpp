@@ -79,14 +79,19 @@ std::vector<std::int64_t> codes_seen(std::span<const double> u_V, const Adc& adc
   return codes;
 }
 
-std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const Adc& adc) {
+int bits_that_would_show(const std::vector<std::int64_t>& codes, const Adc& adc) {
   constexpr std::size_t kEnough = 12;  // different codes that agree by chance once in 4000
-  std::vector<StuckBit> stuck;
-  if (codes.size() < kEnough) return stuck;
+  if (codes.size() < kEnough) return 0;
   const std::int64_t range = codes.back() - codes.front();
+  int bits = 0;
+  while (bits < adc.bits && range >= std::int64_t{4} << bits) ++bits;
+  return bits;
+}
+
+std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const Adc& adc) {
+  std::vector<StuckBit> stuck;
   int low_run = 0;  // neighbouring stuck bits from the lowest on
-  for (int bit = 0; bit < adc.bits; ++bit) {
-    if (range < std::int64_t{4} << bit) break;
+  for (int bit = 0; bit < bits_that_would_show(codes, adc); ++bit) {
     const std::optional<StuckBit> found = unchanging(codes, bit);
     if (!found) continue;
     stuck.push_back(*found);

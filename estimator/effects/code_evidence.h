@@ -30,9 +30,12 @@ struct StuckBit {
   bool value = false;
 };
 
-/// Bits that never change. Only those whose period fits into the range of the readings twice, so
-/// that a working bit could not have hidden; several neighbouring ones from the lowest on, all at
-/// the same value, are a coarser step and not listed.
+/// How many bits, from the lowest on, would be seen not to change: those whose period fits into the
+/// range of the readings twice, so that a working bit could not have hidden.
+int bits_that_would_show(const std::vector<std::int64_t>& codes, const Adc& adc);
+
+/// Bits that never change, of those that would show; several neighbouring ones from the lowest on,
+/// all at the same value, are a coarser step and not listed.
 std::vector<StuckBit> stuck_bits(const std::vector<std::int64_t>& codes, const Adc& adc);
 
 /// Values that readings were rounded to: origin_V + k·step_V.

@@ -133,21 +133,33 @@ Eigen::VectorXd coefficients_in(const PooledNoise& noise, const Eigen::MatrixXd&
   return white_design.colPivHouseholderQr().solve(white_mean);
 }
 
-/// Of −2 ln L in white noise, by which a column is looked at more closely: slow noise as well as
-/// what follows the column is much more than that.
-bool is_worth_a_look(const Eigen::MatrixXd& design, const Eigen::VectorXd& mean,
-                     const Eigen::VectorXd& column) {
-  const Eigen::VectorXd left = mean - design * design.colPivHouseholderQr().solve(mean);
-  const Eigen::VectorXd other = column - design * design.colPivHouseholderQr().solve(column);
-  const double share =
-      left.dot(other) * left.dot(other) / (left.squaredNorm() * other.squaredNorm());
-  return -static_cast<double>(mean.size()) * std::log1p(-std::min(share, 1.0)) > kClearly;
+/// Those by which −2 ln L in white noise is clearly smaller, which are looked at more closely: slow
+/// noise as well as what follows a column is much more than that. None that the design holds.
+std::vector<const Column*> worth_a_look(const std::vector<Column>& columns,
+                                        const Eigen::MatrixXd& design,
+                                        const Eigen::VectorXd& mean) {
+  constexpr double kHeld = 1e-9;  // left of a column, as a share
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
+  const auto left_of = [&](const Eigen::VectorXd& v) {
+    return Eigen::VectorXd(v - design * qr.solve(v));
+  };
+  const Eigen::VectorXd left = left_of(mean);
+  std::vector<const Column*> worth;
+  for (const Column& column : columns) {
+    const Eigen::VectorXd other = left_of(column.mean);
+    if (other.squaredNorm() < kHeld * column.mean.squaredNorm()) continue;
+    const double share =
+        left.dot(other) * left.dot(other) / (left.squaredNorm() * other.squaredNorm());
+    if (-static_cast<double>(mean.size()) * std::log1p(-std::min(share, 1.0)) > kClearly)
+      worth.push_back(&column);
+  }
+  return worth;
 }
 
 /// Of shapes the few that promise most in this noise, with their answers at the samples.
-std::vector<Column> likeliest_shapes(const std::vector<Column>& columns, const PooledNoise& noise,
-                                     const Eigen::MatrixXd& design, const Eigen::VectorXd& mean,
-                                     const Spans& spans) {
+std::vector<Column> likeliest_shapes(const std::vector<const Column*>& columns,
+                                     const PooledNoise& noise, const Eigen::MatrixXd& design,
+                                     const Eigen::VectorXd& mean, const Spans& spans) {
   const Eigen::LLT<Eigen::MatrixXd> factor(noise.covariance);
   const Eigen::MatrixXd white_design = factor.matrixL().solve(design);
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(white_design);
@@ -157,11 +169,11 @@ std::vector<Column> likeliest_shapes(const std::vector<Column>& columns, const P
   };
   const Eigen::VectorXd left = left_of(mean);
   std::vector<std::pair<double, const Column*>> promised;
-  for (const Column& column : columns) {
-    if (column.price == 0 || !is_worth_a_look(design, mean, column.mean)) continue;
-    const Eigen::VectorXd other = left_of(column.mean);
+  for (const Column* column : columns) {
+    if (column->price == 0) continue;
+    const Eigen::VectorXd other = left_of(column->mean);
     const double square = other.squaredNorm();
-    if (square > 0) promised.emplace_back(-left.dot(other) * left.dot(other) / square, &column);
+    if (square > 0) promised.emplace_back(-left.dot(other) * left.dot(other) / square, column);
   }
   std::sort(promised.begin(), promised.end());
   std::vector<Column> likeliest;
@@ -194,7 +206,7 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   // A record that stands on one code is no better known for what is taken out of it.
   if ((u.tail(u.size() - 1).array() != u.head(u.size() - 1).array()).count() < spans.count)
     return {};
-  std::vector<Column> columns = columns_of(table, first, u.size(), spans);
+  const std::vector<Column> columns = columns_of(table, first, u.size(), spans);
   const Eigen::VectorXd mean =
       spans.means(Values(record.data(), u.size())).array() - record.front();
   const double scatter = (mean.tail(spans.count - 1) - mean.head(spans.count - 1)).norm();
@@ -213,15 +225,12 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   std::vector<Column> followed;
   std::optional<PooledNoise> so_far;
   while (followed.size() < kMostTaken) {
-    if (std::none_of(columns.begin(), columns.end(), [&](const Column& column) {
-          return is_worth_a_look(design, mean, column.mean);
-        }))
-      break;
+    const std::vector<const Column*> worth = worth_a_look(columns, design, mean);
+    if (worth.empty()) break;
     if (!so_far) so_far = pool.pool(mean, design);
-    std::vector<Column> possible = likeliest_shapes(columns, *so_far, design, mean, spans);
-    for (const Column& column : columns)
-      if (column.price == 0 && is_worth_a_look(design, mean, column.mean))
-        possible.push_back(column);
+    std::vector<Column> possible = likeliest_shapes(worth, *so_far, design, mean, spans);
+    for (const Column* column : worth)
+      if (column->price == 0) possible.push_back(*column);
     std::optional<PooledNoise> best;
     const Column* which = nullptr;
     for (const Column& column : possible) {

@@ -55,11 +55,10 @@ struct UncertaintyReport {
 };
 
 /// Distributions: noise normal with what the covariance holds beside positioning and rounding, and
-/// so is what the alternatives add;
-/// positioning normal in both angles of each pose, seen by all axes alike, through the true
-/// kinematics to second order; rounding rectangular; gravity normal. Trials come in blocks of 10⁴
-/// until mean, u and both ends of every interval are stable to the tolerance. Deterministic in
-/// input and seed whatever the number of cores.
+/// so is what the alternatives add; positioning normal in both angles of each pose, seen by all
+/// axes alike, through the true kinematics to second order; rounding rectangular; gravity normal.
+/// Trials come in blocks of 10⁴ until mean, u and both ends of every interval are stable to the
+/// tolerance. Deterministic in input and seed whatever the number of cores.
 UncertaintyReport propagate_uncertainty(const PropagatedEstimate& estimate,
                                         const std::vector<Pose>& poses,
                                         const RunDescription& description, std::uint64_t seed);

@@ -14,6 +14,7 @@
 
 #include "estimator/calibrate.h"
 #include "estimator/kinematics.h"
+#include "estimator/parameter_name.h"
 #include "estimator/shifted_parameters.h"
 #include "tests/estimator/synthetic_run.h"
 

@@ -72,7 +72,7 @@ TEST(RecordColumns, WhatFollowsAColumnIsTakenOut) {
   EXPECT_LT(std::sqrt(square), 4 * kWhite_V / std::sqrt(kSamples));
 }
 
-/// What takes out of white noise all that `follows` the temperature does, and names the column.
+/// In white noise, to which something is added that `follows` the temperature.
 void expect_no_walk_left(unsigned seed, const std::function<double(double)>& follows) {
   Draw draw(seed);
   const SampleTable table = table_with(draw.walk(0.01), draw.walk(0.001));
