@@ -37,9 +37,9 @@ void parallel_for(std::size_t count, const Work& work) {
   const auto run = [&] {
     for (std::size_t i = next++; i < count; i = next++) work(i);
   };
-  const std::size_t cores = SerialScope::active() || !linear_algebra_is_thread_safe()
-                                ? 1
-                                : std::max(1U, std::thread::hardware_concurrency());
+  static const std::size_t kCores =  // which reads a file of the system each time
+      linear_algebra_is_thread_safe() ? std::max(1U, std::thread::hardware_concurrency()) : 1;
+  const std::size_t cores = SerialScope::active() ? 1 : kCores;
   // Three like tasks end sooner when two cores share them than when one core has the third alone.
   const std::size_t threads = count < 2 * cores ? count : cores;
   std::vector<std::jthread> helpers;

@@ -68,9 +68,9 @@ void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& tria
 
 /// Covariance of parameters from the columns of their whitened Jacobian.
 Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& whitened_jacobian) {
-  const Eigen::VectorXd norms = whitened_jacobian.colwise().norm();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(whitened_jacobian *
-                                                 norms.cwiseInverse().asDiagonal());
+  const auto in_use = whitened_jacobian.topRows(rows_in_use(whitened_jacobian));
+  const Eigen::VectorXd norms = in_use.colwise().norm();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(in_use * norms.cwiseInverse().asDiagonal());
   const Eigen::MatrixXd r = qr.matrixQR().topRows(norms.size()).triangularView<Eigen::Upper>();
   Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(r.rows(), r.cols());
   r.triangularView<Eigen::Upper>().solveInPlace(inverse);
@@ -104,8 +104,8 @@ bool leave_a_sensitivity_open(const EnlargedFit& fit) {
 bool cancel_each_other(const EnlargedFit& fit) {
   constexpr double kMost = 20;
   const auto& effects = fit.parameters.effects;
-  const Eigen::MatrixXd& jacobian = fit.whitened_jacobian;
   if (effects.size() < 2) return false;
+  const Eigen::MatrixXd& jacobian = fit.whitened_jacobian;
   const Eigen::MatrixXd twelve = orthonormal_basis(jacobian.leftCols(fit.parameters.first_free(0)));
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(jacobian.rows());
   double largest = 0;
@@ -155,26 +155,33 @@ void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd>
   while (first < means_V.rows() && (means_V.row(first).array() == 0).all()) ++first;
   const Eigen::Index rest = means_V.rows() - first;
   if (rest == 0) return;  // OpenBLAS complains of empty products
+  const auto triangle = inverse[axis].bottomRightCorner(rest, rest);
   // So do the columns of a Jacobian that belong to other axes.
-  std::vector<Eigen::Index> seen;
-  for (Eigen::Index j = 0; j < means_V.cols(); ++j)
-    if ((means_V.col(j).array() != 0).any()) seen.push_back(j);
-  const Eigen::MatrixXd concerned = means_V(Eigen::lastN(rest), seen);
-  means_V(Eigen::lastN(rest), seen) =
-      inverse[axis].bottomRightCorner(rest, rest).triangularView<Eigen::Lower>() * concerned;
+  const auto is_seen = [&](Eigen::Index j) { return (means_V.col(j).array() != 0).any(); };
+  for (Eigen::Index j = 0, end = 0; j < means_V.cols(); j = end) {
+    end = j + 1;
+    if (!is_seen(j)) continue;
+    while (end < means_V.cols() && is_seen(end)) ++end;
+    multiply_by_triangle(triangle, means_V.block(first, j, rest, end - j));
+  }
 }
 
 Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   Eigen::MatrixXd whitened = all;
   const Eigen::Index n = lower[0].rows();
   constexpr auto kAxes = static_cast<Eigen::Index>(kAxisCount);
-  parallel_for(kAxisCount, [&](std::size_t axis) {
+  const auto apply_to_axis = [&](std::size_t axis) {
     const auto i = static_cast<Eigen::Index>(axis);
     apply_to_means(axis, whitened.middleRows(i * n, n));
     const Eigen::Index contrasts = dwell_sd_V[axis].size();
     for (Eigen::Index d = 0; d < contrasts; ++d)
       whitened.middleRows((kAxes + i * contrasts + d) * n, n) /= dwell_sd_V[axis](d);
-  });
+  };
+  if (all.cols() > 1) {
+    parallel_for(kAxisCount, apply_to_axis);
+  } else {  // done before a thread has started
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) apply_to_axis(axis);
+  }
   return whitened;
 }
 
@@ -290,7 +297,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     fit.determined = false;
     return fit;
   }
-  fit.covariance = covariance_of(fit.whitened_jacobian.topRows(rows));
+  fit.covariance = covariance_of(fit.whitened_jacobian);
   fit.determined = keeps_sensitivities(fit.parameters, start, kLikelyChange) &&
                    !cancel_each_other(fit) && !leave_a_sensitivity_open(fit) &&
                    !leaves_a_size_open(fit);

@@ -330,6 +330,26 @@ std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters)
   return all;
 }
 
+bool has_sensor_effect(const EnlargedParameters& parameters, std::size_t axis) {
+  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
+                     [&](const ActiveEffect& active) { return is_of_sensor(active, axis); });
+}
+
+/// Writes the columns of the twelve of an axis without effects of the sensor: the readings are
+/// linear in them.
+void set_linear_columns(const Forces& a_g, const std::vector<HeadAtVisit>& head,
+                        Eigen::Index contrasts, std::size_t axis, Eigen::MatrixXd& jacobian) {
+  const Eigen::Index n = std::ssize(a_g), i = static_cast<Eigen::Index>(axis);
+  for (Eigen::Index component = 0; component < 4; ++component) {
+    auto column = jacobian.col(4 * i + component);
+    for (Eigen::Index k = 0; k < n; ++k)
+      column(i * n + k) = component < 3 ? a_g[static_cast<std::size_t>(k)](component) : 1;
+    auto dwells = column.segment((kAxes + i * contrasts) * n, contrasts * n).reshaped(n, contrasts);
+    for (const auto& [visit, course] : head)
+      dwells.row(visit) += course.contrasts_V(Eigen::Vector4d::Unit(component));
+  }
+}
+
 }  // namespace
 
 Eigen::VectorXd stacked_V(const Observations& observed) {
@@ -348,9 +368,17 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
   const std::vector<HeadAtVisit> head = head_courses(log, parameters);
   const Eigen::Index n = std::ssize(a_g), contrasts = log.dwell_contrasts();
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(stacked_rows(log), centre.size());
-  parallel_for(free.size(), [&](std::size_t column) {
-    const auto j = static_cast<Eigen::Index>(column);
-    const auto& [only_axis, step] = free[column];
+  PerAxis<bool> is_linear;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    is_linear[axis] = !has_sensor_effect(parameters, axis);
+    if (is_linear[axis]) set_linear_columns(a_g, head, contrasts, axis, jacobian);
+  }
+  std::vector<std::size_t> others;
+  for (std::size_t j = 0; j < free.size(); ++j)
+    if (!free[j].axis || !is_linear[*free[j].axis]) others.push_back(j);
+  parallel_for(others.size(), [&](std::size_t c) {
+    const auto j = static_cast<Eigen::Index>(others[c]);
+    const auto& [only_axis, step] = free[others[c]];
     const auto moved = [&](double by) {
       EnlargedParameters other = parameters;
       Eigen::VectorXd values = centre;
