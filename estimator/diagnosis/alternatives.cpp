@@ -43,12 +43,18 @@ bool same_effect(const Candidate& a, const Candidate& b) {
   return a.effect == b.effect && (a.effect->subject() == Subject::head || a.axis == b.axis);
 }
 
-/// With Schwarz's approximation of its odds.
+/// With Schwarz's approximation of its odds. Where the readings hardly tell a size from none or an
+/// endless one, it is on its way to a limit in which it is what was found by another name: a
+/// warm-up that has hardly begun at the end of the run is a drift, from a zero that may lie
+/// anywhere. That has no odds.
 Alternative alternative(std::string name, EnlargedFit rival, const EnlargedFit& found) {
   const auto further =
       static_cast<double>(rival.parameters.free_count() - found.parameters.free_count());
   const double behind = rival.chi2 - found.chi2 + kPricePerParameter * further;
-  return {std::move(name), std::move(rival), std::exp(-0.5 * std::max(0.0, behind))};
+  constexpr double kHardly = 0.5;  // standard uncertainties of the size
+  const double odds =
+      leaves_a_size_open(rival, kHardly) ? 0 : std::exp(-0.5 * std::max(0.0, behind));
+  return {std::move(name), std::move(rival), odds};
 }
 
 /// By how much the free parameters of `found` are others in a model with something else in the

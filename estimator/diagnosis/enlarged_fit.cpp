@@ -20,12 +20,20 @@ bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, s
 
 constexpr double kLargestChange = 3, kLikelyChange = 2;  // of a sensitivity, as ratios
 
-/// Of one axis, to its own direction.
+/// Of one axis, to its own direction: about what it was at the start, or what that of another axis
+/// was. A drift in an order of visits that goes up ring by ring may have taken most of it at the
+/// start, and the axes of a triad are alike as a rule.
 bool is_about_the_size(const EnlargedParameters& parameters, const EnlargedParameters& start,
                        std::size_t axis, double most) {
-  const auto own = static_cast<Eigen::Index>(axis);
-  const double ratio = parameters.twelve[axis](own) / start.twelve[axis](own);
-  return ratio > 1 / most && ratio < most;
+  const auto own = [](const EnlargedParameters& of, std::size_t i) {
+    return of.twelve[i](static_cast<Eigen::Index>(i));
+  };
+  const auto is_about = [&](double ratio) { return ratio > 1 / most && ratio < most; };
+  const double size = own(parameters, axis);
+  if (is_about(size / own(start, axis))) return true;
+  for (std::size_t other = 0; other < kAxisCount; ++other)
+    if (other != axis && is_about(std::abs(size / own(start, other)))) return true;
+  return false;
 }
 
 /// Whether part of the response of an axis may be creep.
@@ -144,6 +152,22 @@ bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, 
   return std::sqrt(fit.covariance(k, k)) < kUncertain * size_V_per_g;
 }
 
+bool leaves_a_size_open(const EnlargedFit& fit, double most) {
+  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
+    const ActiveEffect& active = fit.parameters.effects[e];
+    const auto infos = active.effect->parameters();
+    Eigen::Index row = fit.parameters.first_free(e);
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!active.free[k]) continue;
+      const double u = std::sqrt(fit.covariance(row, row));
+      ++row;
+      if (has_a_sign_to_keep(active, infos[k], k) && !(u < most * std::abs(active.p[k])))
+        return true;
+    }
+  }
+  return false;
+}
+
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
   lower[axis] = Eigen::LLT<Eigen::MatrixXd>(covariance_V2).matrixL();
   inverse[axis] = inverse_of_triangle(lower[axis]);
@@ -207,25 +231,6 @@ std::optional<Tangent> tangent_at(const VisitLog& log, const PoseWhitening& whit
   return Tangent{std::move(norms), std::move(qr)};
 }
 
-/// Whether the tangent says nothing of a size: by its uncertainty it might be many times what it
-/// is.
-bool leaves_a_size_open(const EnlargedFit& fit) {
-  constexpr double kMost = 10;
-  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
-    const ActiveEffect& active = fit.parameters.effects[e];
-    const auto infos = active.effect->parameters();
-    Eigen::Index row = fit.parameters.first_free(e);
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (!active.free[k]) continue;
-      const double u = std::sqrt(fit.covariance(row, row));
-      ++row;
-      if (has_a_sign_to_keep(active, infos[k], k) && !(u < kMost * std::abs(active.p[k])))
-        return true;
-    }
-  }
-  return false;
-}
-
 }  // namespace
 
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
@@ -233,6 +238,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          int most_iterations) {
   // The last digits of a model that is far from the readings tell nothing: it is only compared.
   constexpr double kLastDigits = 1e-6, kShareOfExcess = 1e-5;
+  constexpr double kMostOfASize = 10;  // by its uncertainty it might be many times what it is
   const Eigen::Index rows =
       has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
   const Eigen::VectorXd measured = stacked_V(observed);
@@ -300,7 +306,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   fit.covariance = covariance_of(fit.whitened_jacobian);
   fit.determined = keeps_sensitivities(fit.parameters, start, kLikelyChange) &&
                    !cancel_each_other(fit) && !leave_a_sensitivity_open(fit) &&
-                   !leaves_a_size_open(fit);
+                   !leaves_a_size_open(fit, kMostOfASize);
   return fit;
 }
 

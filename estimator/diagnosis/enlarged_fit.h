@@ -36,13 +36,18 @@ struct EnlargedFit : EnlargedEstimate {
 };
 
 /// Whether the sensitivity of each axis to its own direction is within a ratio of `most` of what it
-/// was. Where it is not, effects have taken its place; beside creep that of rest may be anything.
+/// or that of another axis was. Where it is not, effects have taken its place; beside creep that of
+/// rest may be anything.
 bool keeps_sensitivities(const EnlargedParameters& parameters, const EnlargedParameters& start,
                          double most);
 
 /// Whether the sensitivity of an axis to its own direction is known at all, against what it is and
 /// was. In a model that is complete it is, even beside creep.
 bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, std::size_t axis);
+
+/// Whether the tangent says nothing of a time constant, a width or the like of an effect: its
+/// standard uncertainty is `most` times what it is, or more.
+bool leaves_a_size_open(const EnlargedFit& fit, double most);
 
 /// Of a fit that is to settle.
 inline constexpr int kMostIterations = 20;

@@ -249,8 +249,9 @@ struct LatticeFit {
 };
 LatticeFit lattice_fit(std::span<const std::int64_t> codes, double step, double tolerance) {
   // The lowest code lies up to half a declared step off its point. Where the lattice leaves
-  // little room beside that, the remainders would wrap unless they are centred.
+  // little room beside that, the remainders would wrap unless they are centred, and lie far apart.
   const int shifts = static_cast<int>(std::ceil(1 / (step - tolerance)));
+  LatticeFit best;
   for (int k = 0; k < shifts; ++k) {
     const double shift = (k + 0.5) / shifts - 0.5;
     double low = step, high = -step;
@@ -260,9 +261,11 @@ LatticeFit lattice_fit(std::span<const std::int64_t> codes, double step, double 
       high = std::max(high, off);
       if (high - low > tolerance) break;
     }
-    if (high - low <= tolerance) return {true, shift + 0.5 * (low + high), high - low};
+    const double spread = high - low;
+    if (spread <= tolerance && (!best.good || spread < best.spread))
+      best = {true, shift + 0.5 * (low + high), spread};
   }
-  return {};
+  return best;
 }
 
 double range_of(std::span<const std::int64_t> codes) {
@@ -312,8 +315,10 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   /// Neighbouring steps that fit.
   struct Steps {
     double first = 0, last = 0;
-    double least_spread = 0;
+    double tightest = 0, least_spread = 0;
   };
+  // Every lattice point is rounded to one code; codes a whole declared step apart are two for one.
+  const auto is_exact = [](double spread) { return spread < 1 - 1e-9; };
   const auto steps_below = [&](double& tried, double finest) {
     Steps steps;
     while (tried > finest) {
@@ -326,31 +331,39 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
       }
       tried *= std::pow(1 - resolution / 3, std::max(1.0, ruled_out));
     }
+    // Of the coarsest of them without doubt: a finer one may fit where some of its points are not
+    // seen.
+    steps.tightest = 0.5 * (steps.first + steps.last);
     steps.least_spread = kTolerance;
     constexpr int kCloser = 64;
+    double points = 0;  // of those without doubt so far
     for (int k = 0; k <= kCloser && steps.first > 0; ++k) {
-      const LatticeFit closer = fit(steps.first + (steps.last - steps.first) * k / kCloser);
-      if (closer.good) steps.least_spread = std::min(steps.least_spread, closer.spread);
+      const double step = steps.first + (steps.last - steps.first) * k / kCloser;
+      const LatticeFit closer = fit(step);
+      const bool exact = closer.good && is_exact(closer.spread);
+      const double points_here = exact ? std::round((range - closer.middle) / step) : 0;
+      if (points > 0 && points_here != points) break;
+      points = points_here;
+      if (!closer.good || closer.spread >= steps.least_spread) continue;
+      steps.tightest = step;
+      steps.least_spread = closer.spread;
     }
     return steps;
   };
-  // Every lattice point is rounded to one code; codes a whole declared step apart are two for one.
-  const auto is_exact = [](const Steps& steps) { return steps.least_spread < 1 - 1e-9; };
   // From the coarsest down: every part of a step that fits would fit, too. A step must occur often
   // enough to be told from chance. Next to the true step a simple ratio may fit almost as well.
   double tried = std::min(kCoarsest, (range + 1) / 4);
   Steps found = steps_below(tried, kFinest);
   if (found.first == 0) return {};
   const double no_part = std::max(kFinest, found.first / 1.5);
-  while (!is_exact(found) && tried > no_part) {
+  while (!is_exact(found.least_spread) && tried > no_part) {
     const Steps next = steps_below(tried, no_part);
-    if (next.first > 0 && is_exact(next)) found = next;
+    if (next.first > 0 && is_exact(next.least_spread)) found = next;
   }
-  const double first = found.first, last = found.last;
   // Of all sets of so many codes within the range, those that lie on one of the lattices. The code
   // of a point changes for some point whenever the origin moves a little.
-  const double allowed = is_exact(found) ? 1 : 2;
-  const double step = 0.5 * (first + last);
+  const double allowed = is_exact(found.least_spread) ? 1 : 2;
+  const double step = found.tightest;
   const double seen = static_cast<double>(codes.size());
   const double points = std::max(seen, std::floor(range / step) + 1);
   const double lattices = std::log(kCoarsest / kFinest) / resolution * points;

@@ -101,10 +101,11 @@ TEST(CodeEvidence, ACoarserStepIsMeasuredAmongTheCodesOfAFineConverter) {
 
 // All lattices that give these codes are equally likely: the true one lies among them, as far off
 // as is stated.
-TEST(CodeEvidence, StepAndOriginAreKnownAsWellAsIsStated) {
+void expect_known_as_stated(double least_step_V, double most_step_V) {
   const Adc twelve_bits{12, -5.0, 0.0};
   std::mt19937_64 random(7);
-  std::uniform_real_distribution<double> step_of(2.6e-3, 6e-3), first_of(-2.602, -2.6);
+  std::uniform_real_distribution<double> step_of(least_step_V, most_step_V);
+  std::uniform_real_distribution<double> first_of(-2.602, -2.6);
   constexpr int kLattices = 200;
   double sum_first = 0, sum_second = 0, worst = 0;
   for (int k = 0; k < kLattices; ++k) {
@@ -126,6 +127,10 @@ TEST(CodeEvidence, StepAndOriginAreKnownAsWellAsIsStated) {
   EXPECT_NEAR(sum_first / kLattices, 1, 0.35);
   EXPECT_NEAR(sum_second / kLattices, 1, 0.35);
   EXPECT_LT(worst, 4);
+}
+TEST(CodeEvidence, StepAndOriginAreKnownAsWellAsIsStated) { expect_known_as_stated(2.6e-3, 6e-3); }
+TEST(CodeEvidence, SoAreThoseOfALatticeThatLeavesFewCodesOut) {
+  expect_known_as_stated(1.6e-3, 2.4e-3);
 }
 
 TEST(CodeEvidence, DwellsThatStepOverCodesProveALatticeOfFewPoints) {
