@@ -154,7 +154,7 @@ class Relaxation final : public DrivenTerm {
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr int kPlaces = 12;
+    constexpr int kPlaces = 36;
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
     for (int k = 1; k < kPlaces; ++k) add_from(low + (high - low) * k / kPlaces, starts);
