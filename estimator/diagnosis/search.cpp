@@ -65,12 +65,16 @@ class Search {
     }
   }
 
-  /// What the codes prove joins the model.
+  /// What the codes prove joins the model, also where noise smooths its steps so much that the
+  /// readings say nothing of a shape.
   void adopt_proven(std::size_t candidate) {
-    const EnlargedFit with = fit_from_levels(
-        input_.log, model_.stage().observed, model_.stage().whitening,
-        with_effect(model_.stage().fit.parameters, list_.candidates[candidate].active()));
-    if (with.determined) model_.add({candidate, kProven, with.parameters});
+    const ActiveEffect proven = list_.candidates[candidate].active();
+    for (const ActiveEffect& active : {proven, with_shapes_held(proven)}) {
+      const EnlargedFit with =
+          fit_from_levels(input_.log, model_.stage().observed, model_.stage().whitening,
+                          with_effect(model_.stage().fit.parameters, active));
+      if (with.determined && model_.add({candidate, kProven, with.parameters})) return;
+    }
   }
   /// Two effects that the codes of an axis prove are two names for one.
   bool is_proven_otherwise(const Candidate& candidate) const {
