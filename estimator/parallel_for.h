@@ -28,6 +28,13 @@ class SerialScope {
   }
 };
 
+/// Counted once: each count reads a file of the system.
+inline std::size_t usable_cores() {
+  static const std::size_t cores =
+      linear_algebra_is_thread_safe() ? std::max(1U, std::thread::hardware_concurrency()) : 1;
+  return cores;
+}
+
 /// Calls work(i) for i = 0 … count − 1 on all cores and returns when all are done. Results must go
 /// to places of their own, so that they do not depend on the number of threads. `work` must not
 /// throw.
@@ -37,9 +44,7 @@ void parallel_for(std::size_t count, const Work& work) {
   const auto run = [&] {
     for (std::size_t i = next++; i < count; i = next++) work(i);
   };
-  static const std::size_t kCores =  // which reads a file of the system each time
-      linear_algebra_is_thread_safe() ? std::max(1U, std::thread::hardware_concurrency()) : 1;
-  const std::size_t cores = SerialScope::active() ? 1 : kCores;
+  const std::size_t cores = SerialScope::active() ? 1 : usable_cores();
   // Three like tasks end sooner when two cores share them than when one core has the third alone.
   const std::size_t threads = count < 2 * cores ? count : cores;
   std::vector<std::jthread> helpers;

@@ -194,18 +194,15 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   Eigen::MatrixXd whitened = all;
   const Eigen::Index n = lower[0].rows();
   constexpr auto kAxes = static_cast<Eigen::Index>(kAxisCount);
-  const auto apply_to_axis = [&](std::size_t axis) {
+  std::optional<SerialScope> alone;  // one column is done before a thread has started
+  if (all.cols() == 1) alone.emplace();
+  parallel_for(kAxisCount, [&](std::size_t axis) {
     const auto i = static_cast<Eigen::Index>(axis);
     apply_to_means(axis, whitened.middleRows(i * n, n));
     const Eigen::Index contrasts = dwell_sd_V[axis].size();
     for (Eigen::Index d = 0; d < contrasts; ++d)
       whitened.middleRows((kAxes + i * contrasts + d) * n, n) /= dwell_sd_V[axis](d);
-  };
-  if (all.cols() > 1) {
-    parallel_for(kAxisCount, apply_to_axis);
-  } else {  // done before a thread has started
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis) apply_to_axis(axis);
-  }
+  });
   return whitened;
 }
 

@@ -251,6 +251,11 @@ bool has_effect_within_dwell(const EnlargedParameters& parameters) {
                      [](const ActiveEffect& active) { return active.effect->within_dwell(); });
 }
 
+bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
+  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
+                     [&](const ActiveEffect& active) { return is_of_sensor(active, axis); });
+}
+
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
                                          const EnlargedParameters& parameters) {
   return predict_means_V(log, parameters, specific_forces_g(log, parameters));
@@ -330,11 +335,6 @@ std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters)
   return all;
 }
 
-bool has_sensor_effect(const EnlargedParameters& parameters, std::size_t axis) {
-  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
-                     [&](const ActiveEffect& active) { return is_of_sensor(active, axis); });
-}
-
 /// Writes the columns of the twelve of an axis without effects of the sensor: the readings are
 /// linear in them.
 void set_linear_columns(const Forces& a_g, const std::vector<HeadAtVisit>& head,
@@ -370,7 +370,7 @@ Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameter
   Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(stacked_rows(log), centre.size());
   PerAxis<bool> is_linear;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    is_linear[axis] = !has_sensor_effect(parameters, axis);
+    is_linear[axis] = !has_effect_on(parameters, axis);
     if (is_linear[axis]) set_linear_columns(a_g, head, contrasts, axis, jacobian);
   }
   std::vector<std::size_t> others;

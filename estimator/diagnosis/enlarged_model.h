@@ -74,6 +74,9 @@ PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedPara
 /// dwells anything but zero.
 bool has_effect_within_dwell(const EnlargedParameters& parameters);
 
+/// Whether the sensor of an axis has effects; without them its readings are linear in the twelve.
+bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis);
+
 /// Predicted contrasts of the dwells, V, n × log.dwell_contrasts() per axis.
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
                                           const EnlargedParameters& parameters);

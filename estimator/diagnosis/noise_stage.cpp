@@ -113,13 +113,6 @@ PerAxis<Eigen::VectorXd> variance_left_open_V2(const VisitLog& log,
   return variance_V2;
 }
 
-bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
-  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
-                     [axis](const ActiveEffect& active) {
-                       return active.effect->subject() == Subject::sensor && active.axis == axis;
-                     });
-}
-
 /// What the static record says of the noise of an axis.
 NoiseModel record_of(const SearchInput& input, std::size_t axis, bool coarse) {
   if (input.log.codes[axis].coarser_lattice) return without_record(input.noise[axis]);

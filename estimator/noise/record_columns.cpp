@@ -133,20 +133,28 @@ Eigen::VectorXd coefficients_in(const PooledNoise& noise, const Eigen::MatrixXd&
   return white_design.colPivHouseholderQr().solve(white_mean);
 }
 
+/// What a design leaves of a vector.
+class Remainder {
+ public:
+  explicit Remainder(const Eigen::MatrixXd& design) : design_(design), qr_(design) {}
+  Eigen::VectorXd of(const Eigen::VectorXd& v) const { return v - design_ * qr_.solve(v); }
+
+ private:
+  Eigen::MatrixXd design_;
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr_;
+};
+
 /// Those by which −2 ln L in white noise is clearly smaller, which are looked at more closely: slow
 /// noise as well as what follows a column is much more than that. None that the design holds.
 std::vector<const Column*> worth_a_look(const std::vector<Column>& columns,
                                         const Eigen::MatrixXd& design,
                                         const Eigen::VectorXd& mean) {
   constexpr double kHeld = 1e-9;  // left of a column, as a share
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(design);
-  const auto left_of = [&](const Eigen::VectorXd& v) {
-    return Eigen::VectorXd(v - design * qr.solve(v));
-  };
-  const Eigen::VectorXd left = left_of(mean);
+  const Remainder remainder(design);
+  const Eigen::VectorXd left = remainder.of(mean);
   std::vector<const Column*> worth;
   for (const Column& column : columns) {
-    const Eigen::VectorXd other = left_of(column.mean);
+    const Eigen::VectorXd other = remainder.of(column.mean);
     if (other.squaredNorm() < kHeld * column.mean.squaredNorm()) continue;
     const double share =
         left.dot(other) * left.dot(other) / (left.squaredNorm() * other.squaredNorm());
@@ -161,11 +169,9 @@ std::vector<Column> likeliest_shapes(const std::vector<const Column*>& columns,
                                      const PooledNoise& noise, const Eigen::MatrixXd& design,
                                      const Eigen::VectorXd& mean, const Spans& spans) {
   const Eigen::LLT<Eigen::MatrixXd> factor(noise.covariance);
-  const Eigen::MatrixXd white_design = factor.matrixL().solve(design);
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(white_design);
+  const Remainder remainder(factor.matrixL().solve(design));
   const auto left_of = [&](const Eigen::VectorXd& v) {
-    const Eigen::VectorXd white = factor.matrixL().solve(v);
-    return Eigen::VectorXd(white - white_design * qr.solve(white));
+    return remainder.of(factor.matrixL().solve(v));
   };
   const Eigen::VectorXd left = left_of(mean);
   std::vector<std::pair<double, const Column*>> promised;

@@ -2,8 +2,7 @@
 // a static record of 300 s: noise of the record, fits, the search over all candidates with the
 // simulated chance of its best, alternatives and detection limits. The limit is what one look at
 // all candidates cannot do without: their responses, computed and whitened once.
-#include <Eigen/Cholesky>
-#include <cstdlib>
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 
