@@ -107,9 +107,11 @@ struct Size {
   }
 };
 
-void sort_by_id(std::vector<DetectionLimit>& limits) {
+void sort(std::vector<DetectionLimit>& limits) {
   std::stable_sort(limits.begin(), limits.end(),
-                   [](const DetectionLimit& a, const DetectionLimit& b) { return a.id < b.id; });
+                   [](const DetectionLimit& a, const DetectionLimit& b) {
+                     return std::tie(a.id, a.axis) < std::tie(b.id, b.axis);
+                   });
 }
 
 /// Of an effect without amplitude.
@@ -184,7 +186,7 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
         limit_of(*size.first, size.first->effect->parameters().front(), {size.limit()}));
   }
   for (DetectionLimit& limit : limits) limit.sigmas = sigmas_of(log_p[{limit.id, limit.axis}]);
-  sort_by_id(limits);
+  sort(limits);
   return limits;
 }
 
@@ -249,7 +251,7 @@ void add_limits_of_samples(const MeasurementSet& run, const VisitLog& log,
     const int bits = bits_that_would_show(codes, *log.adc);
     if (bits > 0) add("adc.stuck_bit", axis, "bit", 0, bits - 1, "");
   }
-  sort_by_id(limits);
+  sort(limits);
 }
 
 }  // namespace plumbline

@@ -41,7 +41,7 @@ double own_variance_V2(const ExplainInput& input, const SearchResult& found, std
                        std::size_t visit) {
   const PooledNoise& pooled = found.noise[axis];
   const SampleWindow& window = input.windows[visit];
-  const double duration_s = window.step_s * static_cast<double>(window.count);
+  const double duration_s = window.duration_s();
   const auto row = static_cast<Eigen::Index>(visit);
   return pooled.power(kTermN) / duration_s + 2 * pooled.power(kTermQ) / (duration_s * duration_s) +
          input.processes.variance_of_bands(pooled.power, row) + found.own_V2[axis](row);

@@ -24,7 +24,7 @@ bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
   const ActiveEffect& active = fit.parameters.effects[effect];
   if (!active.effect->within_dwell()) return false;
   const Visit& visit = log.visits.front();
-  const double longest_s = kDwells * visit.step_s * static_cast<double>(visit.count);
+  const double longest_s = kDwells * visit.duration_s();
   Eigen::Index row = fit.parameters.first_free(effect);
   const auto infos = active.effect->parameters();
   for (std::size_t k = 0; k < infos.size(); ++k) {
@@ -38,8 +38,8 @@ bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
   return false;
 }
 
-/// Share of the visits to which the spindle came by another tilt than the one before, where these
-/// are few and `effect` sets in at one of them; 1 elsewhere.
+/// Share of the run in which the head was on its way to another tilt, where it is small and
+/// `effect` sets in there; 1 elsewhere.
 double coincidence(const VisitLog& log, const ActiveEffect& active) {
   constexpr double kFew = 0.1;
   const auto sets_in = active.effect->sets_in_at(log, active.p);
@@ -49,9 +49,13 @@ double coincidence(const VisitLog& log, const ActiveEffect& active) {
     return std::abs(log.visits[visit].h_rad - log.visits[visit - 1].h_rad) > kStill_rad;
   };
   if (!is_tilted_anew(*sets_in)) return 1;
-  double tilted_anew = 0;
-  for (std::size_t k = 1; k < log.visits.size(); ++k) tilted_anew += is_tilted_anew(k) ? 1 : 0;
-  const double share = tilted_anew / static_cast<double>(log.visits.size());
+  double way_s = 0, tilting_s = 0;
+  for (std::size_t k = 1; k < log.visits.size(); ++k) {
+    const double after_s = log.visits[k].t_arrival_s - log.visits[k - 1].t_arrival_s;
+    way_s += after_s;
+    if (is_tilted_anew(k)) tilting_s += after_s - log.visits[k - 1].duration_s();
+  }
+  const double share = tilting_s / way_s;
   return share < kFew ? share : 1;
 }
 

@@ -31,7 +31,7 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
   VisitLog longer = log;
   const Visit& first = log.visits.front();
   const double n = static_cast<double>(log.visits.size());
-  const double dwell_s = first.step_s * static_cast<double>(first.count);
+  const double dwell_s = first.duration_s();
   const double cycle_s = std::max((log.last_s() - log.first_s()) / std::max(n - 1, 1.0), dwell_s);
   const auto count =
       static_cast<std::size_t>(std::lround(static_cast<double>(first.count) * samples_factor));

@@ -35,7 +35,7 @@ std::optional<StuckBit> unchanging(const std::vector<std::int64_t>& codes, int b
   if (!std::all_of(codes.begin(), codes.end(),
                    [&](std::int64_t code) { return is_set(code) == value; }))
     return {};
-  return StuckBit{bit, value};
+  return StuckBit{.bit = bit, .value = value};
 }
 
 }  // namespace
@@ -147,8 +147,10 @@ std::vector<StuckBit> jumping_bits(const MeasurementSet& set, std::size_t axis,
   constexpr std::size_t kEnough = 2;  // readings: a single one may be a spike
   std::vector<StuckBit> found;
   for (int bit = kLowest; bit < adc.bits; ++bit) {
-    const std::optional<StuckBit> stuck = unchanging(codes, bit);
-    if (stuck && readings_that_jump(set, axis, adc, *stuck) >= kEnough) found.push_back(*stuck);
+    std::optional<StuckBit> stuck = unchanging(codes, bit);
+    if (!stuck || readings_that_jump(set, axis, adc, *stuck) < kEnough) continue;
+    stuck->is_jumped_over = true;
+    found.push_back(*stuck);
   }
   return found;
 }
@@ -396,9 +398,9 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
 
 CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& adc) {
   const std::vector<std::int64_t> codes = codes_seen(set.samples.u_V[axis], adc);
-  CodeFaults faults{stuck_bits(codes, adc),
+  CodeFaults faults{jumping_bits(set, axis, codes, adc),
                     coarser_lattice(codes, adc, dwells_over_codes(set, axis, adc))};
-  for (const StuckBit& bit : jumping_bits(set, axis, codes, adc))
+  for (const StuckBit& bit : stuck_bits(codes, adc))
     if (std::none_of(faults.stuck_bits.begin(), faults.stuck_bits.end(),
                      [&](const StuckBit& known) { return known.bit == bit.bit; }))
       faults.stuck_bits.push_back(bit);

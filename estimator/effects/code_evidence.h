@@ -28,6 +28,7 @@ std::vector<std::int64_t> codes_seen(std::span<const double> u_V, const Adc& adc
 struct StuckBit {
   int bit = 0;  ///< of the code, counted from the lower end of the span
   bool value = false;
+  bool is_jumped_over = false;  ///< by readings of one dwell, which lie together but for the bit
 };
 
 /// How many bits, from the lowest on, would be seen not to change: those whose period fits into the

@@ -264,13 +264,19 @@ class Step final : public DrivenTerm {
       others.push_back({{found.p[0] + 0.25 * place * found.p[1], kSharp * found.p[1], found.p[2]}});
     return others;
   }
+  /// Of the clock, or of a column that passes the place but once.
   std::optional<std::size_t> sets_in_at(const VisitLog&,
                                         const std::vector<double>& p) const override {
-    if (!variable().is_clock()) return {};
-    const std::vector<double>& t_s = variable().value[0];
-    const auto next = std::upper_bound(t_s.begin(), t_s.end(), p[0]);
-    if (next == t_s.begin() || next == t_s.end() || 2 * p[1] > *next - *(next - 1)) return {};
-    return static_cast<std::size_t>(next - t_s.begin());
+    if (!variable().is_clock() && !variable().recorded) return {};
+    const std::vector<double>& value = variable().value[0];
+    std::optional<std::size_t> passed;
+    for (std::size_t k = 1; k < value.size(); ++k) {
+      if ((value[k] > p[0]) == (value[k - 1] > p[0])) continue;
+      if (passed) return {};
+      passed = k;
+    }
+    if (!passed || 2 * p[1] > std::abs(value[*passed] - value[*passed - 1])) return {};
+    return passed;
   }
 
   /// A step that nothing moves between two values lies anywhere between them.

@@ -39,7 +39,7 @@ class HeadDecay final : public SmoothTerm {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     const Visit& visit = log.visits.front();
-    const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+    const double dwell_s = visit.duration_s();
     if (!(dwell_s > 0)) return {};
     const double size = of_ == DecayOf::way ? effect::kSmallTerm : effect::kSmallAngle_deg;
     std::vector<Hypothesis> starts;

@@ -33,7 +33,7 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
   double end_s = 0;
   for (std::size_t k = 0; k < value.size(); ++k) {
     const Visit& visit = log.visits[k];
-    const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+    const double dwell_s = visit.duration_s();
     if (k > 0) {
       const double gap_s = visit.t_arrival_s - end_s;
       const double from = value[k - 1], to = between == InBetween::evenly ? value[k] : from;

@@ -17,7 +17,7 @@ class Settling final : public Effect {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     const Visit& visit = log.visits.front();
-    const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+    const double dwell_s = visit.duration_s();
     if (!(dwell_s > 0)) return {};
     std::vector<Hypothesis> starts;
     for (double tau_s : effect::geometric(dwell_s / 10, dwell_s * 10, 8)) {

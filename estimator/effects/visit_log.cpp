@@ -69,7 +69,7 @@ std::optional<DwellLine> stronger(const std::optional<DwellLine>& through,
 bool is_in_noise(const DwellLine& line, const Visit& visit, const std::vector<NarrowBand>& bands) {
   constexpr double kPeriods = 1.5;  // more, or fewer, in a dwell
   const double alias_hz = std::abs(std::remainder(line.f_hz, 1 / visit.step_s));
-  const double dwell_s = visit.step_s * static_cast<double>(visit.count);
+  const double dwell_s = visit.duration_s();
   return std::any_of(bands.begin(), bands.end(), [&](const NarrowBand& band) {
     return std::abs(alias_hz - band.f_hz) * dwell_s < kPeriods;
   });
@@ -81,6 +81,7 @@ bool is_missed(const StuckBit& stuck, const VisitLog& log, const MeasurementSet&
                std::size_t axis) {
   constexpr double kSmooth = 8;    // times the noise of a reading, below which noise hides the bit
   constexpr double kNothing = 20;  // times what is left
+  if (stuck.is_jumped_over) return true;
   const double weight_V = std::ldexp(log.adc->lsb_V(), stuck.bit);
   const Eigen::VectorXd left_V = left_by_twelve_V(log, axis);
   const double left_rms_V = std::sqrt(left_V.squaredNorm() / static_cast<double>(left_V.size()));

@@ -32,6 +32,8 @@ struct Visit {
   std::array<int, 3> delta_direction{};
   std::vector<double> covariate;  ///< mean over the dwell
   PerAxis<double> mean_V{};       ///< of the readings
+
+  double duration_s() const { return step_s * static_cast<double>(count); }
 };
 
 inline constexpr const char* kTemperatureColumn = "temp_C";

@@ -308,26 +308,49 @@ MeasurementSet dwells_of_noise(std::uint64_t seed) {
   return set;
 }
 
-TEST(CodeFaults, ABitThatNothingMissesIsNotStuck) {
-  // z reads the same all around: three rings are three readings, here with one bit alike.
+// Three rings, of which z reads the same all around.
+MeasurementSet rings(double lowest_code, double rise_codes, double sd_codes,
+                     std::int64_t (*fault)(std::int64_t code)) {
   MeasurementSet set;
   std::mt19937_64 random(10);
-  std::normal_distribution<double> noise(0, 2);
-  RunDescription description;
-  description.adc = kSixteenBits;
+  std::normal_distribution<double> noise(0, sd_codes);
   for (int k = 0; k < 108; ++k) {
     const double h_deg = 40.0 * (k / 36);
     set.poses.push_back({k, 10.0 * (k % 36), h_deg, set.samples.t_s.size(), 20});
     for (int m = 0; m < 20; ++m) {
       set.samples.t_s.push_back(5.0 * k + 0.01 * m);
       for (auto& u_V : set.samples.u_V) {
-        const double code = 29800 + 4500 * std::sin(h_deg * std::numbers::pi / 180);
-        u_V.push_back(-5 + kSixteenBits.lsb_V() * std::round(code + noise(random)));
+        const double code =
+            lowest_code + rise_codes * std::sin(h_deg * std::numbers::pi / 180) + noise(random);
+        u_V.push_back(kSixteenBits.min_V +
+                      kSixteenBits.lsb_V() * static_cast<double>(fault(std::llround(code))));
       }
     }
   }
+  return set;
+}
+RunDescription of_sixteen_bits() {
+  RunDescription description;
+  description.adc = kSixteenBits;
+  return description;
+}
+
+TEST(CodeFaults, ABitThatNothingMissesIsNotStuck) {
+  // Three readings, here with one bit alike.
+  const MeasurementSet set = rings(29800, 4500, 2, [](std::int64_t code) { return code; });
   EXPECT_FALSE(code_faults(set, 2, kSixteenBits).stuck_bits.empty());
-  EXPECT_TRUE(make_visit_log(set, description).codes[2].stuck_bits.empty());
+  EXPECT_TRUE(make_visit_log(set, of_sixteen_bits()).codes[2].stuck_bits.empty());
+}
+
+// A few readings of one ring lie below the edge of a bit that all others have at its value: the
+// means hardly show it, the readings do.
+TEST(CodeFaults, ABitThatFewReadingsJumpOverIsStuckAlthoughTheMeansFit) {
+  const MeasurementSet set =
+      rings(2112.2, 20, 0.3, [](std::int64_t code) { return code & ~std::int64_t{32}; });
+  const std::vector<StuckBit> stuck = make_visit_log(set, of_sixteen_bits()).codes[2].stuck_bits;
+  ASSERT_EQ(stuck.size(), 1U);
+  EXPECT_EQ(stuck.front().bit, 5);
+  EXPECT_FALSE(stuck.front().value);
 }
 
 TEST(PoseMeans, BurstsOfNoiseMakeAMeanLessCertain) {

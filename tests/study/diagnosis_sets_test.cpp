@@ -386,5 +386,36 @@ TEST(DiagnosisSets, AStepOfOneAndAHalfIsOnlySoWellKnown) {
   EXPECT_LT(outcome.after.fresh, 1.2 * outcome.oracle.fresh);
 }
 
+// Nine readings at the end of the run, of the lowest ring, show the edge of the bit: steps of the
+// bias and of the scale that cancelled there were wrong by a g elsewhere.
+TEST(DiagnosisSets, ABitOfWhichNineReadingsTellIsNamed) {
+  const SetOutcome outcome = run_set({.seed = 1400001,
+                                      .effects = {"adc.stuck_bit"},
+                                      .size = 1,
+                                      .order = sim::RecordOrder::serpentine,
+                                      .noise = NoiseKind::examples,
+                                      .bits = 12,
+                                      .samples_per_pose = 50,
+                                      .static_s = 300});
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
+}
+
+// On the long way back to the next ring the bias stepped, the tilt changed and the humidity passed
+// some value: of the three the step in time is no coincidence.
+TEST(DiagnosisSets, WhatHappensOnALongWayBetweenRingsHappensInTime) {
+  const SetOutcome outcome = run_set({.seed = 1400003,
+                                      .effects = {"sensor.bias_step"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::white,
+                                      .bits = 12,
+                                      .samples_per_pose = 50,
+                                      .static_s = 1800});
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+}
+
 }  // namespace
 }  // namespace plumbline::study
