@@ -53,11 +53,25 @@ bool take_back_each_other(const SearchModel& model, std::size_t first, std::size
   return (one + other).norm() < kMostLeft * std::min(one.norm(), other.norm());
 }
 
+/// The likeliest, and the likeliest of those with a name: to first order the response of a large
+/// effect falls behind functions without a name that happen to run like it.
+std::vector<Scored> worth_refining(const CandidateList& list, const std::vector<Scored>& ranked) {
+  constexpr std::size_t kMost = 4;
+  std::vector<Scored> likeliest;
+  std::size_t named = 0;
+  for (const Scored& s : ranked) {
+    const bool has_name = list.candidates[s.candidate].has_name();
+    if (likeliest.size() >= kMost && (!has_name || named >= kMost)) continue;
+    named += has_name ? 1 : 0;
+    likeliest.push_back(s);
+  }
+  return likeliest;
+}
+
 /// What is worth its price in the place of a subset, likeliest first.
 std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const CandidateResponses& responses,
                                               const std::vector<std::size_t>& subset) {
-  constexpr std::size_t kMostRefined = 4;
   std::vector<SearchModel::Entry> exchanges;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return exchanges;
@@ -66,9 +80,9 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   const double spent = model.price_of(subset) + (two_for_one ? 2 * kHandicapOfUnnamed : 0);
   const CandidateGains gains(responses, without);
   const Eigen::VectorXd first_order = gains.of_residual();
-  const std::vector<Scored> ranked = screen(model.list(), gains, first_order);
-  for (std::size_t r = 0; r < std::min(kMostRefined, ranked.size()); ++r) {
-    const std::size_t index = ranked[r].candidate;
+  for (const Scored& scored :
+       worth_refining(model.list(), screen(model.list(), gains, first_order))) {
+    const std::size_t index = scored.candidate;
     const Candidate& candidate = model.list().candidates[index];
     const Candidate& replaced = model.candidate(subset.front());
     if (subset.size() == 1 && candidate.family == replaced.family &&
