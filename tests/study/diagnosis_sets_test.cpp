@@ -392,7 +392,7 @@ TEST(DiagnosisSets, ABitOfWhichNineReadingsTellIsNamed) {
   const SetOutcome outcome = run_set({.seed = 1400001,
                                       .effects = {"adc.stuck_bit"},
                                       .size = 1,
-                                      .order = sim::RecordOrder::serpentine,
+                                      .order = sim::RecordOrder::snake,
                                       .noise = NoiseKind::examples,
                                       .bits = 12,
                                       .samples_per_pose = 50,
