@@ -41,6 +41,7 @@ struct Experiment {
   const Eigen::MatrixXd& A;   ///< n × 4
   Eigen::MatrixXd drivers;    ///< n × k, temperature and covariates
   PerAxis<double> white_V{};  ///< white noise of one reading; negative when unknown
+  PerAxis<double> line_V2{};  ///< VisitLog's, where there is one
   NoiseProcesses processes;
   /// Variance of each mean beyond that of a quiet dwell, where the noise follows something.
   PerAxis<Eigen::VectorXd> noisier_V2;
@@ -163,7 +164,8 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   if (experiment.input.description.adc && experiment.white_V[axis] >= 0) {
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
       free = free_of_rounding(mean_V, expected_V, *experiment.input.description.adc,
-                              experiment.white_V[axis], samples_per_pose(experiment.input.run));
+                              experiment.white_V[axis], samples_per_pose(experiment.input.run),
+                              experiment.line_V2[axis]);
       work.y = free.mean_V;
       // Where the steps keep their edges, few means say more than the others together.
       const Eigen::VectorXd weight =
@@ -330,7 +332,7 @@ Calibration calibrate_in_noise(const FurtherNoise& further, const PreparedRun& r
   if (result.observability.rank < 4) return result;
 
   Experiment experiment{input, run.poses, run.A, driver_means(input.run.samples, input.run.poses),
-                        {},    {},        {}};
+                        {},    {},        {},    {}};
   const std::size_t n = experiment.poses.size();
   result.convergence.rls.resize(n);
   result.convergence.ekf.resize(n);
@@ -346,6 +348,7 @@ Calibration calibrate_in_noise(const FurtherNoise& further, const PreparedRun& r
   std::vector<NoiseDriver> noise_follows;
   if (n >= kFewestPosesToDecide) {
     log = make_visit_log(input.run, input.description, further.bands);
+    experiment.line_V2 = log->line_V2;
     noise_follows = noise_drivers(
         *log, input.run, {time_blocks(experiment.poses), position_blocks(experiment.poses)});
     for (const NoiseDriver& driver : noise_follows)

@@ -146,7 +146,7 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       // A converter without one of its bits does not round as it should.
       if (!input.log.adc || samples < 2 || !input.log.codes[i].stuck_bits.empty()) return;
       free = free_of_rounding(input.observed.mean_V[i], expected_V, *input.log.adc,
-                              input.log.sample_sd_V[i], samples);
+                              input.log.sample_sd_V[i], samples, input.log.line_V2[i]);
       mean_V = free.mean_V;
     };
     if (freed) {

@@ -112,6 +112,7 @@ double log_choices(double n, double k) {
 /// them, on its other side, if the bit were what it is not.
 std::size_t readings_that_jump(const MeasurementSet& set, std::size_t axis, const Adc& adc,
                                const StuckBit& stuck) {
+  constexpr std::int64_t kBeyondNoise = 4;  // codes
   const std::int64_t size = std::int64_t{1} << stuck.bit;
   const std::int64_t sign = stuck.value ? -1 : 1;
   std::size_t jumps = 0;
@@ -135,7 +136,9 @@ std::size_t readings_that_jump(const MeasurementSet& set, std::size_t axis, cons
     }
     const bool apart = least_moved > high || most_moved < least_kept;
     const std::int64_t spread = std::max(high, most_moved) - std::min(least_kept, least_moved);
-    if (apart && spread <= size / 4) jumps += moved;
+    // A spike comes to lie anywhere, a reading without its bit where noise takes the others.
+    const std::int64_t noise = std::max(high - least_kept, most_moved - least_moved);
+    if (apart && spread <= std::min(size / 4, 2 * noise + kBeyondNoise)) jumps += moved;
   }
   return jumps;
 }

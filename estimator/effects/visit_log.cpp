@@ -65,6 +65,12 @@ std::optional<DwellLine> stronger(const std::optional<DwellLine>& through,
   return between->amplitude_V > kClearly * through->amplitude_V ? between : through;
 }
 
+/// What a line adds to half the mean square of the differences between neighbouring samples.
+double between_samples_V2(const DwellLine& line, double step_s) {
+  const double size_V = line.amplitude_V * std::sin(std::numbers::pi * line.f_hz * step_s);
+  return size_V * size_V;
+}
+
 /// Whether within a dwell a line cannot be told from a disturbance that is part of the noise.
 bool is_in_noise(const DwellLine& line, const Visit& visit, const std::vector<NarrowBand>& bands) {
   constexpr double kPeriods = 1.5;  // more, or fewer, in a dwell
@@ -305,6 +311,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.highest_V[i] = *high;
     log.line[i] =
         stronger(line_through_dwells(set, i), line_between_dwells(set, left_by_twelve_V(log, i)));
+    if (log.line[i]) log.line_V2[i] = between_samples_V2(*log.line[i], log.visits.front().step_s);
     if (log.line[i] && is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
   });
   for (const Visit& visit : log.visits)

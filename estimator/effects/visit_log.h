@@ -48,6 +48,7 @@ struct VisitLog {
   /// Those of `columns` that were not recorded (kTemperatureColumn among them).
   std::vector<std::string> lacking(std::vector<std::string> columns) const;
   PerAxis<double> sample_sd_V{};  ///< white noise of one sample, within the dwells
+  PerAxis<double> line_V2{};      ///< the part of its square that a line through the dwells is
   /// The same before the converter: freed of what rounding and stuck bits do to it.
   PerAxis<double> input_sd_V{};
   PerAxis<CodeFaults> codes;                ///< where a converter is declared

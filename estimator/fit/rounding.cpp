@@ -153,17 +153,20 @@ Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
 }
 
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
-                              const Adc& adc, double sample_sd_V, double samples_per_mean) {
+                              const Adc& adc, double sample_sd_V, double samples_per_mean,
+                              double line_V2) {
+  constexpr double kLeastNoise = 0.01;  // of the square: how large a line is, is not known better
   const CodeScale scale = scale_of(adc);
   const double step_V = scale.step_V, origin_V = scale.origin_V;
   const double recorded_V2 = sample_sd_V * sample_sd_V;
+  const double noise_share = recorded_V2 > 0 ? std::max(1 - line_V2 / recorded_V2, kLeastNoise) : 1;
   double white_V2 = noise_before_rounding_V2(step_V, recorded_V2);
   double sigma_V = std::sqrt(white_V2);
   const Eigen::Index n = mean_V.size();
   if (sigma_V > kNoTrace * step_V) return {mean_V, Eigen::VectorXd::Zero(n), false};
 
   const double full_V2 = rounding_variance(step_V, sigma_V);
-  const double mean_white_V2 = recorded_V2 / samples_per_mean;
+  const double mean_white_V2 = noise_share * recorded_V2 / samples_per_mean;
   RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
   if (sigma_V < kSoftest * step_V) {
     const CodeSites sites = within_edges(mean_V, expected_V, scale, samples_per_mean,
@@ -194,7 +197,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
           rounding_bias(expected_V(k), origin_V, step_V, std::sqrt(white_V2 + slow_V2));
       const double slope = std::max(1 + bias.slope, kFlattest);
       const double off_V = mean_V(k) - expected_V(k) - bias.bias;
-      const double white_mean_V2 = step_V * step_V / samples_per_mean *
+      const double white_mean_V2 = noise_share * step_V * step_V / samples_per_mean *
                                    rounded_variance((expected_V(k) - origin_V) / step_V,
                                                     sigma_V / step_V, std::sqrt(slow_V2) / step_V);
       // Far from the expectation the slope there says nothing: rounding moves no mean further than

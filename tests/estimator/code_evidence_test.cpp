@@ -353,6 +353,24 @@ TEST(CodeFaults, ABitThatFewReadingsJumpOverIsStuckAlthoughTheMeansFit) {
   EXPECT_FALSE(stuck.front().value);
 }
 
+// Where z takes thirty codes, four of its bits in twelve never change.
+TEST(CodeFaults, TwoSpikesAreSeldomTakenForABit) {
+  constexpr int kSets = 100, kMost = 1;
+  const MeasurementSet sound = rings(2112.6, 20, 0.3, [](std::int64_t code) { return code; });
+  std::mt19937_64 random(14);
+  std::uniform_int_distribution<std::size_t> row(0, sound.samples.size() - 1);
+  std::uniform_int_distribution<int> off(5, 200);
+  int taken = 0;
+  for (int k = 0; k < kSets; ++k) {
+    MeasurementSet set = sound;
+    for (int spike = 0; spike < 2; ++spike)
+      set.samples.u_V[2][row(random)] +=
+          kSixteenBits.lsb_V() * off(random) * (row(random) % 2 ? 1 : -1);
+    taken += make_visit_log(set, of_sixteen_bits()).codes[2].stuck_bits.empty() ? 0 : 1;
+  }
+  EXPECT_LE(taken, kMost);
+}
+
 TEST(PoseMeans, BurstsOfNoiseMakeAMeanLessCertain) {
   MeasurementSet set = dwells_of_noise(11);
   const Pose& loud = set.poses[17];
