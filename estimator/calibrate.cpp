@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -73,6 +74,19 @@ PreparedRun prepared(const CalibrationInput& input) {
   return run;
 }
 
+/// Whether a line of the record runs through all dwells with one phase and nearly as strong: what
+/// wanders does not.
+bool goes_on(const SpectralLine& line, const MeasurementSet& run, std::size_t axis,
+             const SampleWindow& dwell) {
+  constexpr double kNearly = 0.8, kPeriods = 1;  // more, or fewer, in a dwell
+  const auto through = line_through_dwells(run, axis);
+  if (!through || through->amplitude_V < kNearly * line.amplitude) return false;
+  const auto alias_hz = [&](double f_hz) {
+    return std::abs(std::remainder(f_hz, 1 / dwell.step_s));
+  };
+  return std::abs(alias_hz(through->f_hz) - alias_hz(line.f_hz)) * dwell.duration_s() < kPeriods;
+}
+
 /// Whether another kind of noise might lead elsewhere: a line that wanders is found as many things
 /// where it is no noise, and where it is, a steady one hides in it.
 bool leaves_open(const Calibration& result, const MeasurementSet& run,
@@ -105,7 +119,10 @@ InItsNoise calibrate_in_likeliest(const PreparedRun& run, const CalibrationOptio
   PerAxis<Eigen::VectorXd> mean_V;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     mean_V[axis] = mean_voltages(run.poses, axis);
-  const std::vector<FurtherNoise> noises = possible_noises(run.noise, run.windows, mean_V, run.A);
+  const std::vector<FurtherNoise> noises = possible_noises(
+      run.noise, run.windows, mean_V, run.A, [&](std::size_t axis, const SpectralLine& line) {
+        return goes_on(line, run.input.run, axis, run.windows.front());
+      });
   const FurtherNoise& first = noises.front();
   InItsNoise chosen{first, calibrate_in_noise(first, run, options)};
   if (noises.size() > 1 && leaves_open(chosen.result, run.input.run, first)) {

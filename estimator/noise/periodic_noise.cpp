@@ -14,18 +14,19 @@
 namespace plumbline {
 namespace {
 
-/// The line of the records that is strongest in a mean, in units of the white noise there; nothing
-/// where none matters.
-std::optional<SpectralLine> strongest_line(const PerAxis<NoiseModel>& noise,
-                                           const SampleWindow& window) {
+/// The line of the records that is strongest in a mean, in units of the white noise there, of those
+/// that may wander; nothing where none matters.
+std::optional<SpectralLine> strongest_line(
+    const PerAxis<NoiseModel>& noise, const SampleWindow& window,
+    const std::function<bool(std::size_t axis, const SpectralLine&)>& goes_on) {
   constexpr double kMatters = 0.1;  // of the variance
   std::optional<SpectralLine> strongest;
   double most = kMatters;
-  for (const NoiseModel& model : noise) {
-    const double white = square(model.N.value) / window.duration_s();
-    for (const SpectralLine& line : model.record.lines) {
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const double white = square(noise[axis].N.value) / window.duration_s();
+    for (const SpectralLine& line : noise[axis].record.lines) {
       const double in_mean = 0.5 * square(line.amplitude * share_of_sine(window, line.f_hz));
-      if (!(white > 0 && in_mean > most * white)) continue;
+      if (!(white > 0 && in_mean > most * white) || goes_on(axis, line)) continue;
       most = in_mean / white;
       strongest = line;
     }
@@ -62,13 +63,13 @@ double deviance_in(const FurtherNoise& further, const PerAxis<NoiseModel>& noise
 
 }  // namespace
 
-std::vector<FurtherNoise> possible_noises(const PerAxis<NoiseModel>& noise,
-                                          const std::vector<SampleWindow>& windows,
-                                          const PerAxis<Eigen::VectorXd>& mean_V,
-                                          const Eigen::MatrixXd& design) {
+std::vector<FurtherNoise> possible_noises(
+    const PerAxis<NoiseModel>& noise, const std::vector<SampleWindow>& windows,
+    const PerAxis<Eigen::VectorXd>& mean_V, const Eigen::MatrixXd& design,
+    const std::function<bool(std::size_t axis, const SpectralLine&)>& goes_on) {
   const Eigen::MatrixXd columns = orthonormal_basis(design);
   const auto line = columns.rows() > columns.cols()
-                        ? strongest_line(noise, windows[windows.size() / 2])
+                        ? strongest_line(noise, windows[windows.size() / 2], goes_on)
                         : std::nullopt;
   if (!line) return {{}};
   const FurtherNoise throughout{.bands = bands_about(*line, windows)};

@@ -53,9 +53,10 @@ Readings readings(std::uint64_t seed, double amplitude_V, bool line_pauses) {
   return made;
 }
 
-std::vector<FurtherNoise> possible(const Readings& made) {
+std::vector<FurtherNoise> possible(const Readings& made, bool goes_on = false) {
   return possible_noises(made.noise, made.windows, made.mean_V,
-                         Eigen::MatrixXd::Ones(made.mean_V[0].size(), 1));
+                         Eigen::MatrixXd::Ones(made.mean_V[0].size(), 1),
+                         [=](std::size_t, const SpectralLine&) { return goes_on; });
 }
 
 TEST(PossibleNoises, WithoutALineThatMattersThereIsOne) {
@@ -73,6 +74,12 @@ TEST(PossibleNoises, ALineThatWandersThroughRecordAndRunIsLikeliest) {
     EXPECT_GT(noises.front().bands.back().f_hz, kLine_hz) << seed;
     EXPECT_FALSE(noises.front().bands_pause) << seed;
   }
+}
+
+TEST(PossibleNoises, ALineThatGoesOnSteadilyIsNoNoise) {
+  const auto noises = possible(readings(1, 0.6 * kNoise_V, false), true);
+  ASSERT_EQ(noises.size(), 1);
+  EXPECT_TRUE(noises.front().bands.empty());
 }
 
 TEST(PossibleNoises, TheClockOfTheLineMayStandStillBetweenTheWindows) {
