@@ -123,6 +123,23 @@ TEST(RoundingFree, MovesNoMeanByMoreThanRoundingDoes) {
   EXPECT_LT(std::abs(free.mean_V(0) - mean_V(0)), 0.2 * step_V);
 }
 
+// A pickup of one step in noise of a third: the mean of a dwell scatters by the noise alone.
+TEST(RoundingFree, ALineInTheReadingsIsNoNoiseOfTheirMeans) {
+  constexpr Adc adc{12, -5, 0};
+  constexpr double kOfLine = 0.75;
+  const double step_V = adc.lsb_V(), sample_sd_V = 0.6 * step_V;
+  Eigen::VectorXd mean_V(200);
+  for (Eigen::Index k = 0; k < 200; ++k) mean_V(k) = -2.5 + step_V * 0.137 * static_cast<double>(k);
+  const RoundingFree noise = free_of_rounding(mean_V, mean_V, adc, sample_sd_V, 50);
+  const RoundingFree line =
+      free_of_rounding(mean_V, mean_V, adc, sample_sd_V, 50, kOfLine * sample_sd_V * sample_sd_V);
+  ASSERT_TRUE(noise.coarse);
+  EXPECT_NEAR(noise.variance_V2.mean(), sample_sd_V * sample_sd_V / 50,
+              0.1 * noise.variance_V2.mean());
+  EXPECT_NEAR(line.variance_V2.mean() / noise.variance_V2.mean(), 1 - kOfLine, 0.05);
+  EXPECT_EQ(line.mean_V, noise.mean_V);
+}
+
 // Readings taken all over the steps scatter by what rounding adds; the less noise, the more of it.
 TEST(RoundingFree, NoiseIsToldFromWhatRoundingAddsHoweverSmall) {
   std::mt19937_64 random(1);

@@ -402,6 +402,30 @@ TEST(DiagnosisSets, ABitOfWhichNineReadingsTellIsNamed) {
   EXPECT_LT(outcome.after.fresh, 1.1 * outcome.oracle.fresh);
 }
 
+// A sine of one step and a half of the converter is neither noise of the means nor, where next to
+// nothing of it is left in them, a line that wanders.
+TEST(DiagnosisSets, APickupOfMoreThanAStepIsNamed) {
+  const SetDesign by_scatter{.seed = 1450001,
+                             .effects = {"adc.mains_pickup"},
+                             .size = 10,
+                             .order = sim::RecordOrder::random,
+                             .noise = NoiseKind::white,
+                             .bits = 12,
+                             .samples_per_pose = 40,
+                             .static_s = 300};
+  SetDesign by_phase = by_scatter;
+  by_phase.seed = 1450002;
+  by_phase.order = sim::RecordOrder::raster;
+  by_phase.noise = NoiseKind::examples;
+  by_phase.samples_per_pose = 50;
+  by_phase.static_s = 1800;
+  for (const SetDesign& design : {by_scatter, by_phase}) {
+    const SetOutcome outcome = run_set(design);
+    EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+    EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  }
+}
+
 // On the long way back to the next ring the bias stepped, the tilt changed and the humidity passed
 // some value: of the three the step in time is no coincidence.
 TEST(DiagnosisSets, WhatHappensOnALongWayBetweenRingsHappensInTime) {
