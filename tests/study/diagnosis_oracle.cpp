@@ -61,6 +61,9 @@ PoseWhitening true_whitening(const StudySet& set, const VisitLog& log) {
     const Eigen::MatrixXd& dwell_V = plain.dwell_V[i];
     whitening.dwell_sd_V[i] =
         (dwell_V.colwise().squaredNorm() / static_cast<double>(dwell_V.rows())).cwiseSqrt();
+    // What no dwell resolves is zero with and without the effect.
+    whitening.dwell_sd_V[i] =
+        (whitening.dwell_sd_V[i].array() > 0).select(whitening.dwell_sd_V[i], 1);
   }
   return whitening;
 }

@@ -83,10 +83,16 @@ struct Score {
   }
 };
 
+/// From one who is told the effect, where it is on the list and where it is not.
+constexpr double kFar = 1.15, kFarOutside = 1.5;
+
 /// All that a group of sets shows.
 struct Tally {
   Score ours, naive;
   Share coverage, K, U0, unexplained, worse;
+  /// Of one who is told the effect: error above 1.02 of that before; and how often ours is far from
+  /// that, then too weak an effect or one that other names explain as well.
+  Share told_worse, far_from_told, far_and_weak, far_and_stated;
   std::vector<double> heldout, evaluated, told, after_told, seconds;
   std::map<std::string, int> claims;  ///< how often what was reported, for effects outside the list
   int sets = 0, infeasible = 0, undetectable = 0;
@@ -105,9 +111,19 @@ struct Tally {
     seconds.push_back(o.seconds);
     heldout.push_back(o.after.heldout / o.oracle.heldout);
     evaluated.push_back(o.evaluated_fresh / o.oracle.fresh);
+    const bool outside = kind_of(o.design) == SetKind::own;
+    const bool is_weak =
+        std::any_of(o.sigma.begin(), o.sigma.end(), [&](double s) { return s < detectable_sigma; });
     if (std::isfinite(o.told_fresh)) {
       told.push_back(o.told_fresh / o.oracle.fresh);
       after_told.push_back(o.after.fresh / o.told_fresh);
+      count(told_worse, o.told_fresh > 1.02 * o.before.fresh);
+      const bool is_far = after_told.back() > (outside ? kFarOutside : kFar);
+      count(far_from_told, is_far);
+      if (is_far) {
+        count(far_and_weak, is_weak);
+        count(far_and_stated, !is_weak && o.named < o.effects && o.named_or_stated == o.effects);
+      }
     }
     coverage.k += o.parameters_within;
     coverage.n += o.parameters;
@@ -116,12 +132,10 @@ struct Tally {
     U0.k += o.U0_within;
     U0.n += 3;
     if (o.effects == 0) return;
-    if (std::any_of(o.sigma.begin(), o.sigma.end(),
-                    [&](double s) { return s < detectable_sigma; })) {
+    if (is_weak) {
       ++undetectable;
       return;
     }
-    const bool outside = kind_of(o.design) == SetKind::own;
     ours.add_detectable(o, outside);
     naive.add_detectable(o.naive, outside);
     if (outside) ++claims[claim(o.found)];
@@ -224,6 +238,10 @@ std::string totals(const Tally& all, double detectable_sigma) {
     errors("  fresh poses, error after / told the effect", all.after_told);
   }
   errors("  fresh poses, naive", all.naive.fresh);
+  line("told the effect, above 1.02 of before", all.told_worse);
+  line("after above 1.15 of told (outside the list 1.5)", all.far_from_told);
+  line("  of these an effect of less than the sigma above", all.far_and_weak);
+  line("  of these right among the stated alternatives", all.far_and_stated);
   text += fmt::format("calibrate(): median {:.2f} s, longest {:.2f} s\n",
                       quantile(all.seconds, 0.5), quantile(all.seconds, 1));
   return text;
