@@ -81,10 +81,8 @@ bool goes_on(const SpectralLine& line, const MeasurementSet& run, std::size_t ax
   constexpr double kNearly = 0.8, kPeriods = 1;  // more, or fewer, in a dwell
   const auto through = line_through_dwells(run, axis);
   if (!through || through->amplitude_V < kNearly * line.amplitude) return false;
-  const auto alias_hz = [&](double f_hz) {
-    return std::abs(std::remainder(f_hz, 1 / dwell.step_s));
-  };
-  return std::abs(alias_hz(through->f_hz) - alias_hz(line.f_hz)) * dwell.duration_s() < kPeriods;
+  const double apart_hz = alias_hz(through->f_hz, dwell.step_s) - alias_hz(line.f_hz, dwell.step_s);
+  return std::abs(apart_hz) * dwell.duration_s() < kPeriods;
 }
 
 /// Whether another kind of noise might lead elsewhere: a line that wanders is found as many things

@@ -49,13 +49,13 @@ double coincidence(const VisitLog& log, const ActiveEffect& active) {
     return std::abs(log.visits[visit].h_rad - log.visits[visit - 1].h_rad) > kStill_rad;
   };
   if (!is_tilted_anew(*sets_in)) return 1;
-  double way_s = 0, tilting_s = 0;
+  double tilting_s = 0;
   for (std::size_t k = 1; k < log.visits.size(); ++k) {
-    const double after_s = log.visits[k].t_arrival_s - log.visits[k - 1].t_arrival_s;
-    way_s += after_s;
-    if (is_tilted_anew(k)) tilting_s += after_s - log.visits[k - 1].duration_s();
+    const Visit& before = log.visits[k - 1];
+    if (is_tilted_anew(k))
+      tilting_s += log.visits[k].t_arrival_s - before.t_arrival_s - before.duration_s();
   }
-  const double share = tilting_s / way_s;
+  const double share = tilting_s / (log.visits.back().t_arrival_s - log.first_s());
   return share < kFew ? share : 1;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -17,6 +18,11 @@ struct DwellLine {
   double phase_rad = 0;  ///< 0 … 2π
   bool steady = true;  ///< as strong at the end of a dwell as at its beginning, and not begun by it
 };
+
+/// The frequency, up to half the rate of readings `step_s` apart, at which these show a line.
+inline double alias_hz(double f_hz, double step_s) {
+  return std::abs(std::remainder(f_hz, 1 / step_s));
+}
 
 /// The line of one axis that noise would not often show (once in 10⁵ sets), if there is one. Looked
 /// for where its alias has 1.5 periods a dwell or more: first by the power within the dwells,

@@ -74,10 +74,9 @@ double between_samples_V2(const DwellLine& line, double step_s) {
 /// Whether within a dwell a line cannot be told from a disturbance that is part of the noise.
 bool is_in_noise(const DwellLine& line, const Visit& visit, const std::vector<NarrowBand>& bands) {
   constexpr double kPeriods = 1.5;  // more, or fewer, in a dwell
-  const double alias_hz = std::abs(std::remainder(line.f_hz, 1 / visit.step_s));
-  const double dwell_s = visit.duration_s();
+  const double seen_hz = alias_hz(line.f_hz, visit.step_s);
   return std::any_of(bands.begin(), bands.end(), [&](const NarrowBand& band) {
-    return std::abs(alias_hz - band.f_hz) * dwell_s < kPeriods;
+    return std::abs(seen_hz - band.f_hz) * visit.duration_s() < kPeriods;
   });
 }
 
@@ -311,8 +310,9 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.highest_V[i] = *high;
     log.line[i] =
         stronger(line_through_dwells(set, i), line_between_dwells(set, left_by_twelve_V(log, i)));
-    if (log.line[i]) log.line_V2[i] = between_samples_V2(*log.line[i], log.visits.front().step_s);
-    if (log.line[i] && is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
+    if (!log.line[i]) return;
+    log.line_V2[i] = between_samples_V2(*log.line[i], log.visits.front().step_s);
+    if (is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
   });
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))

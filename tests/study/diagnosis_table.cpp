@@ -83,6 +83,7 @@ struct Score {
   }
 };
 
+constexpr double kWorse = 1.02;  // of the error before
 /// From one who is told the effect, where it is on the list and where it is not.
 constexpr double kFar = 1.15, kFarOutside = 1.5;
 
@@ -107,7 +108,7 @@ struct Tally {
     naive.add(o.naive, o.naive_fresh / o.oracle.fresh);
     count(unexplained, o.verdict == Verdict::unexplained || o.verdict == Verdict::partly_explained);
     count(worse,
-          o.after.fresh > 1.02 * o.before.fresh || o.after.heldout > 1.02 * o.before.heldout);
+          o.after.fresh > kWorse * o.before.fresh || o.after.heldout > kWorse * o.before.heldout);
     seconds.push_back(o.seconds);
     heldout.push_back(o.after.heldout / o.oracle.heldout);
     evaluated.push_back(o.evaluated_fresh / o.oracle.fresh);
@@ -117,7 +118,7 @@ struct Tally {
     if (std::isfinite(o.told_fresh)) {
       told.push_back(o.told_fresh / o.oracle.fresh);
       after_told.push_back(o.after.fresh / o.told_fresh);
-      count(told_worse, o.told_fresh > 1.02 * o.before.fresh);
+      count(told_worse, o.told_fresh > kWorse * o.before.fresh);
       const bool is_far = after_told.back() > (outside ? kFarOutside : kFar);
       count(far_from_told, is_far);
       if (is_far) {
@@ -210,7 +211,7 @@ std::string totals(const Tally& all, double detectable_sigma) {
     text += fmt::format("{:<52}{}  {}\n", name, long_cell(all.ours.*share),
                         long_cell(all.naive.*share));
   };
-  const auto line = [&](const char* name, const Share& share) {
+  const auto line = [&](const std::string& name, const Share& share) {
     if (share.n > 0) text += fmt::format("{:<52}{}\n", name, long_cell(share));
   };
   both("an effect or a structure claimed", &Score::any);
@@ -225,7 +226,7 @@ std::string totals(const Tally& all, double detectable_sigma) {
   line("effect parameters within 1.96 u", all.coverage);
   line("K within 1.96 u", all.K);
   line("U0 within 1.96 u", all.U0);
-  line("error after above 1.02 of before", all.worse);
+  line(fmt::format("error after above {} of before", kWorse), all.worse);
   const auto errors = [&](const char* name, const std::vector<double>& ratios) {
     text += fmt::format("{:<52}median {:.3f}, 95 % {:.3f}, worst {:.3f}\n", name,
                         quantile(ratios, 0.5), quantile(ratios, 0.95), quantile(ratios, 1));
@@ -238,8 +239,9 @@ std::string totals(const Tally& all, double detectable_sigma) {
     errors("  fresh poses, error after / told the effect", all.after_told);
   }
   errors("  fresh poses, naive", all.naive.fresh);
-  line("told the effect, above 1.02 of before", all.told_worse);
-  line("after above 1.15 of told (outside the list 1.5)", all.far_from_told);
+  line(fmt::format("told the effect, above {} of before", kWorse), all.told_worse);
+  line(fmt::format("after above {} of told (outside the list {})", kFar, kFarOutside),
+       all.far_from_told);
   line("  of these an effect of less than the sigma above", all.far_and_weak);
   line("  of these right among the stated alternatives", all.far_and_stated);
   text += fmt::format("calibrate(): median {:.2f} s, longest {:.2f} s\n",
