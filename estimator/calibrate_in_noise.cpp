@@ -163,7 +163,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   RoundingFree free;
   if (experiment.input.description.adc && experiment.white_V[axis] >= 0) {
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
-      free = free_of_rounding(mean_V, expected_V, *experiment.input.description.adc,
+      free = free_of_rounding(mean_V, expected_V, scale_of(*experiment.input.description.adc),
                               experiment.white_V[axis], samples_per_pose(experiment.input.run),
                               experiment.line_V2[axis]);
       work.y = free.mean_V;

@@ -8,6 +8,7 @@
 
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
+#include "estimator/effects/function_of_driver.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/linear_algebra.h"
 #include "estimator/parallel_for.h"
@@ -45,18 +46,15 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
 
 namespace {
 
-/// What an axis does from code to code has a name where the codes prove it.
+/// What an axis does from code to code has a name where the codes prove it, and what of that is
+/// left over repeats itself with what is measured, too.
 bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
+  const bool repeats = is_wave(term) || is_saw_tooth(term);
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    if (term.driver() == std::string("code_") + kAxisName[i]) return log.codes[i].any();
+    if (term.driver() == std::string("code_") + kAxisName[i] ||
+        (repeats && term.driver() == std::string("a_") + kAxisName[i]))
+      return log.codes[i].any();
   return false;
-}
-
-/// Whether readings say in which undeclared step they are and no more. What slow noise takes over
-/// an edge there, whole rings of poses, is no structure.
-bool is_nothing_but_steps(const VisitLog& log, std::size_t axis) {
-  constexpr double kSoftest = 0.25;  // of a step: with more noise there is a slope between edges
-  return log.noise_in_coarser_steps(axis).value_or(kSoftest) < kSoftest;
 }
 
 /// Once per amplitude; an effect of shapes and indices alone once as it stands.
@@ -104,10 +102,6 @@ CandidateList all_candidates(const VisitLog& log,
     list.owned.push_back(std::move(term));
     add_candidates(list, log, *list.owned.back(), kHandicapOfUnnamed);
   }
-  std::erase_if(list.candidates, [&](const Candidate& candidate) {
-    return !candidate.has_name() && candidate.effect->subject() == Subject::sensor &&
-           is_nothing_but_steps(log, candidate.axis);
-  });
   for (const auto& effect : own) {
     list.owned.push_back(effect);
     add_candidates(list, log, *effect);

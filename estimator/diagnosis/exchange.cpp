@@ -29,6 +29,39 @@ double chi2_beside(const SearchModel& model, const Candidate& candidate, const E
   return fit.chi2 - at_start;
 }
 
+/// Exchanges effects for others, and drops what that makes superfluous, unless slow noise would
+/// have to take up what the others leave: the noise as it stands was estimated beside what is to
+/// go. Whether it did.
+bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& effects,
+                           const std::vector<SearchModel::Entry>& with) {
+  PerAxis<bool> touched{};
+  for (const std::size_t k : effects)
+    for (const std::size_t axis : axes_of(model.stage().fit.parameters.effects[k]))
+      touched[axis] = true;
+  bool has_slow = false;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    has_slow = has_slow || (touched[axis] && has_slow_noise(model.input(), model.stage(), axis));
+  if (!has_slow) return model.exchange(effects, with);
+  // Which of some forty names is one more choice for every effect more; in slow noise some two of
+  // them always come close.
+  constexpr double kOfForty = 7.4;
+  const double more =
+      kOfForty * static_cast<double>(std::max(with.size(), effects.size()) - effects.size());
+  const SearchModel before = model;
+  const auto cost = [&](const SearchModel& of) {
+    double sum = of.price();
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (touched[axis])
+        sum += deviance_of_axis(model.input(), of.stage().fit.parameters, axis, before.stage());
+    return sum;
+  };
+  if (!model.exchange(effects, with)) return false;
+  model.drop_superfluous();
+  if (cost(model) + more < cost(before)) return true;
+  model = before;
+  return false;
+}
+
 /// Whether two effects mostly take back what the other does beside the 12 parameters: two names
 /// that happen to add up to something else.
 bool take_back_each_other(const SearchModel& model, std::size_t first, std::size_t second) {
@@ -136,7 +169,7 @@ bool exchange_one(SearchModel& model) {
                [&](std::size_t s) { exchanges[s] = exchanges_for(model, responses, subsets[s]); });
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     for (const SearchModel::Entry& with : exchanges[s])
-      if (model.exchange(subsets[s], with)) return true;
+      if (exchange_in_own_noise(model, subsets[s], {with})) return true;
   }
   return false;
 }
@@ -219,7 +252,7 @@ bool exchange_for_one_kind(SearchModel& model) {
   const CandidateResponses& responses = model.responses();
   for (const auto& subset : subsets) {
     const std::vector<SearchModel::Entry> kind = one_kind_for(model, responses, subset);
-    if (!kind.empty() && model.exchange(subset, kind)) return true;
+    if (!kind.empty() && exchange_in_own_noise(model, subset, kind)) return true;
   }
   return false;
 }
@@ -377,12 +410,12 @@ bool name_unlisted(SearchModel& model) {
   for (std::size_t k = 0; k < model.size(); ++k) {
     if (model.candidate(k).has_name()) continue;
     const std::vector<SearchModel::Entry> parts = parts_with_names(model, responses, k);
-    if (!parts.empty() && model.exchange({k}, parts)) return true;
+    if (!parts.empty() && exchange_in_own_noise(model, {k}, parts)) return true;
   }
   const Named named = named_candidates(model);
   for (const auto& subset : subsets) {
     const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
-    if (!names.empty() && model.exchange(subset, names)) return true;
+    if (!names.empty() && exchange_in_own_noise(model, subset, names)) return true;
   }
   return false;
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "estimator/fit/rounding.h"
@@ -121,6 +122,38 @@ NoiseModel record_of(const SearchInput& input, std::size_t axis, bool coarse) {
                 : input.noise[axis];
 }
 
+/// Whether the readings of an axis are of a coarser lattice that the model does not hold (yet).
+/// They are then freed of rounding to it: a model that holds the lattice turns every error on its
+/// edges into one of a whole step, in which what else there is on that axis hides.
+bool lacks_lattice(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis) {
+  return log.codes[axis].coarser_lattice &&
+         std::none_of(parameters.effects.begin(), parameters.effects.end(),
+                      [&](const ActiveEffect& active) {
+                        return active.axis == axis && active.effect->certain(log, axis);
+                      });
+}
+
+/// Means of readings with what the declared converter made of each point of the lattice undone.
+Eigen::VectorXd on_lattice_V(const Lattice& lattice, const Eigen::VectorXd& mean_V) {
+  const auto points = std::ssize(lattice.reading_V);
+  const auto nominal_V = [&](std::ptrdiff_t k) {
+    return lattice.origin_V + lattice.step_V * static_cast<double>(k);
+  };
+  const auto reading_V = [&](std::ptrdiff_t k) {
+    const double seen_V = k >= 0 && k < points ? lattice.reading_V[static_cast<std::size_t>(k)]
+                                               : std::numeric_limits<double>::quiet_NaN();
+    return std::isnan(seen_V) ? nominal_V(k) : seen_V;
+  };
+  return mean_V.unaryExpr([&](double value_V) {
+    auto below =
+        static_cast<std::ptrdiff_t>(std::floor((value_V - lattice.origin_V) / lattice.step_V));
+    if (value_V < reading_V(below)) --below;
+    if (value_V >= reading_V(below + 1)) ++below;
+    const double from_V = reading_V(below), to_V = reading_V(below + 1);
+    return nominal_V(below) + lattice.step_V * (value_V - from_V) / (to_V - from_V);
+  });
+}
+
 }  // namespace
 
 PerAxis<const PooledNoise*> all_of(const PerAxis<PooledNoise>& noise) {
@@ -140,13 +173,20 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
       variance_left_open_V2(input.log, parameters, predicted);
   parallel_for(kAxisCount, [&](std::size_t i) {
     Eigen::VectorXd& mean_V = stage.observed.mean_V[i];
+    const std::optional<Lattice>& lattice = input.log.codes[i].coarser_lattice;
+    const bool on_lattice = lacks_lattice(input.log, parameters, i);
+    if (on_lattice) mean_V = on_lattice_V(*lattice, mean_V);
+    const Eigen::VectorXd measured_V = mean_V;
     const bool freed = before.freed != nullptr && before.freed->coarse[i];
     RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
       // A converter without one of its bits does not round as it should.
       if (!input.log.adc || samples < 2 || !input.log.codes[i].stuck_bits.empty()) return;
-      free = free_of_rounding(input.observed.mean_V[i], expected_V, *input.log.adc,
-                              input.log.sample_sd_V[i], samples, input.log.line_V2[i]);
+      const CodeScale scale =
+          on_lattice ? CodeScale{.origin_V = lattice->origin_V, .step_V = lattice->step_V}
+                     : scale_of(*input.log.adc);
+      free = free_of_rounding(measured_V, expected_V, scale, input.log.sample_sd_V[i], samples,
+                              input.log.line_V2[i]);
       mean_V = free.mean_V;
     };
     if (freed) {

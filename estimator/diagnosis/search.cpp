@@ -25,9 +25,7 @@ class Search {
       : input_(input), list_(list), options_(options), model_(input, list, options) {}
 
   SearchResult run() {
-    for (std::size_t c = 0; c < list_.candidates.size(); ++c)
-      if (model_.is_certain(list_.candidates[c]) && !is_proven_otherwise(list_.candidates[c]))
-        adopt_proven(c);
+    adopt_all_proven(false);
     grow();
     constexpr int kMostNamings = 3;
     for (int k = 0; k < kMostNamings && name_unlisted(model_); ++k) {
@@ -39,6 +37,7 @@ class Search {
          ++k)
       model_.drop_superfluous();
     model_.drop_what_excess_explains();
+    adopt_all_proven(true);
     SearchResult result = model_.take_result();
     result.p_best_rest = p_best_rest_;
     return result;
@@ -65,14 +64,24 @@ class Search {
     }
   }
 
+  /// What the codes prove; coarser lattices last: until then readings are freed of them.
+  void adopt_all_proven(bool lattices) {
+    for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
+      const Candidate& candidate = list_.candidates[c];
+      if (model_.is_certain(candidate) && !is_proven_otherwise(candidate) &&
+          input_.log.codes[candidate.axis].coarser_lattice.has_value() == lattices)
+        adopt_proven(c);
+    }
+  }
   /// What the codes prove joins the model, also where noise smooths its steps so much that the
   /// readings say nothing of a shape.
   void adopt_proven(std::size_t candidate) {
     const ActiveEffect proven = list_.candidates[candidate].active();
+    Observations observed = model_.stage().observed;
+    observed.mean_V[proven.axis] = input_.observed.mean_V[proven.axis];  // freed of what now joins
     for (const ActiveEffect& active : {proven, with_shapes_held(proven)}) {
-      const EnlargedFit with =
-          fit_from_levels(input_.log, model_.stage().observed, model_.stage().whitening,
-                          with_effect(model_.stage().fit.parameters, active));
+      const EnlargedFit with = fit_from_levels(input_.log, observed, model_.stage().whitening,
+                                               with_effect(model_.stage().fit.parameters, active));
       if (with.determined && model_.add({candidate, kProven, with.parameters})) return;
     }
   }

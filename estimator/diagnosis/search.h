@@ -28,9 +28,6 @@ struct SearchOptions {
   /// Of a train of pulses where readings hang on the edges of codes: it gathers whatever is odd at
   /// some visits, which is not Gaussian there.
   double false_alarm_of_train_at_edges = 1e-6;
-  /// Of anything on an axis of which the readings say hardly more than in which step of a coarser
-  /// converter they are: slow noise takes whole rings of poses over an edge there.
-  double false_alarm_at_steps = 1e-10;
   int replicates = 150;  ///< of simulated noise, for the look-elsewhere correction
   std::size_t max_effects = 6;
 };

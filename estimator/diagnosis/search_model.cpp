@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -91,9 +92,12 @@ bool same_on_axis(const EnlargedParameters& a, const EnlargedParameters& b, std:
 
 SearchModel::SearchModel(const SearchInput& input, const CandidateList& list,
                          const SearchOptions& options)
-    : input_(input), list_(list), options_(options) {
+    : input_(&input), list_(&list), options_(&options) {
   Before before;
   if (input.pooled != nullptr) before.known = all_of(*input.pooled);
+  // What was pooled takes rounding to a lattice for noise.
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (input.log.codes[axis].coarser_lattice) before.known[axis] = nullptr;
   stage_ = settle(input, input.start, before);
   noise_is_own_ = input.pooled == nullptr;
 }
@@ -105,74 +109,70 @@ bool SearchModel::is_dropped(const Candidate& candidate) const {
 bool SearchModel::is_on_another_axis(const Candidate& candidate) const {
   return candidate.effect->subject() == Subject::sensor &&
          std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
-           const Candidate& chosen = list_.candidates[k];
+           const Candidate& chosen = list().candidates[k];
            return chosen.effect == candidate.effect && chosen.axis != candidate.axis;
          });
 }
 
 double SearchModel::looks_of(const Candidate& candidate) const {
-  return is_on_another_axis(candidate) ? std::min(looks_, looks_on_axes(list_, candidate)) : looks_;
+  return is_on_another_axis(candidate) ? std::min(looks_, looks_on_axes(list(), candidate))
+                                       : looks_;
 }
 
 double SearchModel::p_of(const Candidate& candidate, double log_p_local) const {
   return p_of_search(log_p_local, looks_of(candidate));
 }
 
-bool SearchModel::shows_steps(std::size_t axis) const {
-  constexpr double kFew = 0.5;  // of a step: with more noise the edges are washed out
-  return input_.log.noise_in_coarser_steps(axis).value_or(kFew) < kFew;
-}
-
 double SearchModel::false_alarm(const Candidate& candidate) const {
-  const bool of_head = candidate.effect->subject() == Subject::head;
-  const double usual =
-      is_on_another_axis(candidate) ? options_.false_alarm_on_another_axis : options_.false_alarm;
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    if ((of_head || axis == candidate.axis) && shows_steps(axis))
-      return std::min(usual, options_.false_alarm_at_steps);
-  return usual;
+  return is_on_another_axis(candidate) ? options().false_alarm_on_another_axis
+                                       : options().false_alarm;
 }
 
 PerAxis<double> SearchModel::false_alarm_of_slow() const {
   PerAxis<double> share;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    share[axis] = shows_steps(axis)     ? options_.false_alarm_at_steps
-                  : stage_.coarse[axis] ? options_.false_alarm_of_slow_when_coarse
-                                        : options_.false_alarm_of_slow;
+    share[axis] = stage_.coarse[axis] ? options().false_alarm_of_slow_when_coarse
+                                      : options().false_alarm_of_slow;
   return share;
 }
 
 double SearchModel::price(std::size_t candidate) const {
-  const Candidate& c = list_.candidates[candidate];
+  const Candidate& c = list().candidates[candidate];
   const Eigen::Index amplitudes = with_shapes_held(c.active()).free_count();
-  return 2 * (std::log(static_cast<double>(list_.family_size[c.family])) + c.handicap) +
+  return 2 * (std::log(static_cast<double>(list().family_size[c.family])) + c.handicap) +
          kPerAmplitude * static_cast<double>(std::max<Eigen::Index>(1, amplitudes));
 }
 
 double SearchModel::price_of(const std::vector<std::size_t>& effects) const {
   double sum = 0;
   for (const std::size_t k : effects)
-    sum += price(chosen_[k]) + surcharge(input_.log, stage_.fit, k);
+    sum += price(chosen_[k]) + surcharge(input().log, stage_.fit, k);
   return sum;
 }
 
+double SearchModel::price() const {
+  std::vector<std::size_t> all(size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return price_of(all);
+}
+
 double SearchModel::price_in(const EnlargedFit& with, std::size_t candidate) const {
-  return price(candidate) + surcharge(input_.log, with, with.parameters.effects.size() - 1);
+  return price(candidate) + surcharge(input().log, with, with.parameters.effects.size() - 1);
 }
 
 double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
                              const EnlargedFit& with, int dof) const {
   const double log_p_gaussian = log_chi_squared_tail(before.chi2 - with.chi2, dof);
-  if (!list_.candidates[candidate].of_one_coarse_reading) return log_p_gaussian;
-  const auto before_V = predict_means_V(input_.log, before.parameters);
-  const auto with_V = predict_means_V(input_.log, with.parameters);
+  if (!list().candidates[candidate].of_one_coarse_reading) return log_p_gaussian;
+  const auto before_V = predict_means_V(input().log, before.parameters);
+  const auto with_V = predict_means_V(input().log, with.parameters);
   PerAxis<double> moved_V;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     moved_V[i] = (with_V[i] - before_V[i]).lpNorm<Eigen::Infinity>();
-    if (moved_V[i] > input_.log.step_V(i)) return log_p_gaussian;
+    if (moved_V[i] > input().log.step_V(i)) return log_p_gaussian;
   }
   // The axes round independently of each other: Fisher's sum of their log-probabilities.
-  const Eigen::Index n = std::ssize(input_.log.visits);
+  const Eigen::Index n = std::ssize(input().log.visits);
   double sum = 0;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const Eigen::Index row = static_cast<Eigen::Index>(axis) * n;
@@ -182,7 +182,7 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
     // Rounding makes single means stray, but no further than it moves any: once to one side, where
     // it is undone to the other.
     const double strays_V =
-        2 * largest_rounding_bias_V(input_.log.step_V(axis), input_.log.input_sd_V[axis]);
+        2 * largest_rounding_bias_V(input().log.step_V(axis), input().log.input_sd_V[axis]);
     const double beyond = std::sqrt(of_axis) * std::max(0.0, 1 - strays_V / moved_V[axis]);
     const double p =
         std::min(f_tail(of_axis, 1, kDofOfCoarseReadings), normal_two_sided_tail(beyond));
@@ -193,13 +193,13 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
 
 EnlargedFit SearchModel::fit_with(const EnlargedParameters& model,
                                   const ActiveEffect& active) const {
-  return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening,
+  return fit_holding_shapes(input().log, stage_.observed, stage_.whitening,
                             with_effect(model, active), model.effects.size());
 }
 
 EnlargedFit SearchModel::fit_with(const CandidateGains& gains, std::size_t place,
                                   const Candidate& candidate, double promised) const {
-  return fit_with_candidate({input_.log, stage_.observed, stage_.whitening}, gains, place,
+  return fit_with_candidate({input().log, stage_.observed, stage_.whitening}, gains, place,
                             candidate, promised);
 }
 
@@ -208,7 +208,7 @@ EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) co
   for (auto k = effects.rbegin(); k != effects.rend(); ++k)
     fewer = without_effect(std::move(fewer), *k);
   // What is missing may drive the shapes of the others to where they change nothing.
-  return fit_holding_shapes(input_.log, stage_.observed, stage_.whitening, fewer, 0);
+  return fit_holding_shapes(input().log, stage_.observed, stage_.whitening, fewer, 0);
 }
 
 bool SearchModel::adopt(const EnlargedParameters& parameters) {
@@ -216,17 +216,17 @@ bool SearchModel::adopt(const EnlargedParameters& parameters) {
   for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
     if (same_on_axis(parameters, stage_.fit.parameters, axis))
       before.known[axis] = &stage_.noise[axis];
-  Stage next = settle(input_, parameters, before);
+  Stage next = settle(input(), parameters, before);
   if (!next.fit.determined && !parameters.effects.empty()) {
     // Against less noise a shape may go on to where it changes nothing any more.
     EnlargedParameters held = parameters;
     held.effects.back() = with_shapes_held(std::move(held.effects.back()));
-    next = settle(input_, held, before);
+    next = settle(input(), held, before);
   }
   // Fit by fit a sensitivity may go far.
   constexpr double kLargestChange = 3;  // as a ratio
   if (!next.fit.determined ||
-      !keeps_sensitivities(next.fit.parameters, input_.start, kLargestChange))
+      !keeps_sensitivities(next.fit.parameters, input().start, kLargestChange))
     return false;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (before.known[axis] != nullptr) next.crossing_V2[axis] = std::move(stage_.crossing_V2[axis]);
@@ -238,20 +238,20 @@ bool SearchModel::adopt(const EnlargedParameters& parameters) {
 
 const CandidateResponses& SearchModel::responses() {
   if (!responses_)
-    responses_ = candidate_responses(input_.log, list_, stage_.whitening, stage_.fit.parameters);
+    responses_ = candidate_responses(input().log, list(), stage_.whitening, stage_.fit.parameters);
   return *responses_;
 }
 
 bool SearchModel::is_certain(const Candidate& candidate) const {
-  return candidate.effect->certain(input_.log, candidate.axis);
+  return candidate.effect->certain(input().log, candidate.axis);
 }
 
 bool SearchModel::is_chosen(const Candidate& candidate) const {
   if (is_certain(candidate)) return true;  // in the model from the start
   return !candidate.effect->repeats() &&
          std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
-           return list_.candidates[k].effect == candidate.effect &&
-                  list_.candidates[k].axis == candidate.axis;
+           return list().candidates[k].effect == candidate.effect &&
+                  list().candidates[k].axis == candidate.axis;
          });
 }
 
@@ -271,11 +271,11 @@ EnlargedFit SearchModel::looked_closer(EnlargedFit fit) const {
   constexpr double kClearly = 10;
   const ActiveEffect& newcomer = fit.parameters.effects.back();
   const std::vector<Hypothesis> closer =
-      newcomer.effect->closer(input_.log, newcomer.axis, {newcomer.p});
+      newcomer.effect->closer(input().log, newcomer.axis, {newcomer.p});
   std::vector<EnlargedFit> fits(closer.size());
   const auto fit_all = [&](int most_iterations) {
     parallel_for(fits.size(), [&](std::size_t k) {
-      fits[k] = fit_enlarged(input_.log, stage_.observed, stage_.whitening, fits[k].parameters,
+      fits[k] = fit_enlarged(input().log, stage_.observed, stage_.whitening, fits[k].parameters,
                              most_iterations);
     });
   };
@@ -313,13 +313,13 @@ void SearchModel::leave_ties_open() {
   for (std::size_t k = 0; k < chosen_.size(); ++k) {
     const ActiveEffect& active = stage_.fit.parameters.effects[k];
     const std::vector<double> open =
-        active.effect->with_ties_open(input_.log, active.axis, active.p);
+        active.effect->with_ties_open(input().log, active.axis, active.p);
     if (open.empty()) continue;
     EnlargedParameters parameters = stage_.fit.parameters;
     parameters.effects[k].p = open;
     const Before before{.start = &stage_.noise, .freed = &stage_};
-    const Stage as_it_is = settle_noise(input_, stage_.fit.parameters, before);
-    const Stage left_open = settle_noise(input_, parameters, before);
+    const Stage as_it_is = settle_noise(input(), stage_.fit.parameters, before);
+    const Stage left_open = settle_noise(input(), parameters, before);
     double gain = 0;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
       gain += as_it_is.noise[axis].likelihood_deviance - left_open.noise[axis].likelihood_deviance;
@@ -364,7 +364,7 @@ bool SearchModel::drop(std::size_t effect, const EnlargedFit& without) {
 double SearchModel::excess(std::size_t effect) const {
   constexpr double kByChance = 1e-6, kMatters = 1.2;
   const ActiveEffect& active = stage_.fit.parameters.effects[effect];
-  const Eigen::Index n = std::ssize(input_.log.visits);
+  const Eigen::Index n = std::ssize(input().log.visits);
   double square = 0, dof = 0;
   for (const std::size_t axis : axes_of(active)) {
     if (stage_.coarse[axis]) return 1;  // of which the residual is no measure

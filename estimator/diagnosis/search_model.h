@@ -15,9 +15,9 @@ class SearchModel {
   /// Begins with input.start. All three must live as long.
   SearchModel(const SearchInput& input, const CandidateList& list, const SearchOptions& options);
 
-  const SearchInput& input() const { return input_; }
-  const CandidateList& list() const { return list_; }
-  const SearchOptions& options() const { return options_; }
+  const SearchInput& input() const { return *input_; }
+  const CandidateList& list() const { return *list_; }
+  const SearchOptions& options() const { return *options_; }
   const Stage& stage() const { return stage_; }
   /// Whether the noise of the stage was estimated beside its model and nothing else.
   bool noise_is_own() const { return noise_is_own_; }
@@ -25,7 +25,7 @@ class SearchModel {
   /// Effects in the model, and which of the candidates each of them is.
   std::size_t size() const { return chosen_.size(); }
   std::size_t index(std::size_t effect) const { return chosen_[effect]; }
-  const Candidate& candidate(std::size_t effect) const { return list_.candidates[index(effect)]; }
+  const Candidate& candidate(std::size_t effect) const { return list().candidates[index(effect)]; }
   /// Whether the codes prove it.
   bool is_certain(const Candidate& candidate) const;
   /// An effect stands in the model once; a second pose, slip or step is another matter.
@@ -61,6 +61,7 @@ class SearchModel {
   double price_in(const EnlargedFit& with, std::size_t candidate) const;
   /// What some of the model's effects had to gain together.
   double price_of(const std::vector<std::size_t>& effects) const;
+  double price() const;  ///< all of them
 
   /// The candidates beside the model as it stands.
   const CandidateResponses& responses();
@@ -99,7 +100,6 @@ class SearchModel {
   SearchResult take_result();
 
  private:
-  bool shows_steps(std::size_t axis) const;
   bool adopt(const EnlargedParameters& parameters);
   void look_closer();
   void leave_ties_open();
@@ -114,9 +114,10 @@ class SearchModel {
   /// may be chance, or little.
   double excess(std::size_t effect) const;
 
-  const SearchInput& input_;
-  const CandidateList& list_;
-  const SearchOptions& options_;
+  // Pointers: a model that was kept takes the place of another.
+  const SearchInput* input_;
+  const CandidateList* list_;
+  const SearchOptions* options_;
   Stage stage_;
   bool noise_is_own_ = false;
   std::optional<CandidateResponses> responses_;

@@ -104,6 +104,24 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
   return screen(slow.list, *gains_of, gains);
 }
 
+/// Of ranked candidates the likeliest, and the likeliest of what acts otherwise: shapes of one
+/// driver take many of the first places, though few look the same once each has its own noise.
+std::vector<Scored> likeliest_of_each_kind(const CandidateList& list,
+                                           const std::vector<Scored>& ranked) {
+  constexpr std::size_t kLikeliest = 6, kMost = 10;
+  std::vector<Scored> worth;
+  for (const Scored& s : ranked) {
+    if (worth.size() == kMost) break;
+    const auto acts_like_it =
+        [&, id = list.candidates[s.candidate].effect->id()](const Scored& other) {
+          return list.candidates[other.candidate].effect->id() == id;
+        };
+    if (worth.size() < kLikeliest || std::none_of(worth.begin(), worth.end(), acts_like_it))
+      worth.push_back(s);
+  }
+  return worth;
+}
+
 }  // namespace
 
 bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::size_t effect,
@@ -127,7 +145,6 @@ bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t ax
 std::optional<SlowFinding> look_among_slow(const SearchInput& input, const CandidateList& list,
                                            const Stage& stage, bool noise_is_own,
                                            const SlowLook& look) {
-  constexpr std::size_t kRefined = 6;
   constexpr double kHopeless = 0.9;  // to first order: its own noise and shapes gain it more
   const EnlargedParameters& model = stage.fit.parameters;
   const Stage rich = settle_beside(input, model, stage, look.beside);
@@ -160,7 +177,8 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
   };
   std::erase_if(ranked,
                 [&](const Scored& s) { return p_of_look(s.log_p, s.candidate) > kHopeless; });
-  std::vector<Stage> stages(std::min(kRefined, ranked.size()));
+  ranked = likeliest_of_each_kind(list, ranked);
+  std::vector<Stage> stages(ranked.size());
   parallel_for(stages.size(), [&](std::size_t k) {
     const Candidate& candidate = list.candidates[ranked[k].candidate];
     Before compared{.known = all_of(plain), .start = &rich.noise, .freed = &rich};

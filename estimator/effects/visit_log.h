@@ -82,11 +82,6 @@ struct VisitLog {
 
   /// Step between neighbouring readings of an axis, as declared or as the codes show.
   double step_V(std::size_t axis) const;
-  /// Noise of an axis in undeclared steps; nothing where the codes show none.
-  std::optional<double> noise_in_coarser_steps(std::size_t axis) const {
-    const auto& lattice = codes[axis].coarser_lattice;
-    return lattice ? std::optional(input_sd_V[axis] / lattice->step_V) : std::nullopt;
-  }
   /// Whether some axis reads with less noise than its converter needs to average rounding away.
   bool is_coarse() const;
   double first_s() const { return visits.front().t_arrival_s; }

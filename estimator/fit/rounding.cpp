@@ -153,10 +153,9 @@ Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
 }
 
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
-                              const Adc& adc, double sample_sd_V, double samples_per_mean,
+                              const CodeScale& scale, double sample_sd_V, double samples_per_mean,
                               double line_V2) {
   constexpr double kLeastNoise = 0.01;  // of the square: how large a line is, is not known better
-  const CodeScale scale = scale_of(adc);
   const double step_V = scale.step_V, origin_V = scale.origin_V;
   const double recorded_V2 = sample_sd_V * sample_sd_V;
   const double noise_share = recorded_V2 > 0 ? std::max(1 - line_V2 / recorded_V2, kLeastNoise) : 1;

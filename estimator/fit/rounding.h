@@ -6,6 +6,7 @@
 
 #include "estimator/measurement.h"
 #include "estimator/noise/noise_model.h"
+#include "estimator/quantization/interval_fit.h"
 
 namespace plumbline {
 
@@ -42,7 +43,7 @@ struct RoundingFree {
 /// `line_V2`: what part of the square of sample_sd_V is a line, which rounds steps off as noise
 /// does but does not add to the variance of a mean.
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
-                              const Adc& adc, double sample_sd_V, double samples_per_mean,
+                              const CodeScale& scale, double sample_sd_V, double samples_per_mean,
                               double line_V2 = 0);
 
 /// What a static record says of the noise of other places when rounding matters: nothing of white
