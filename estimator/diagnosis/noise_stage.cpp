@@ -259,15 +259,25 @@ Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchR
   const Eigen::MatrixXd& C = found.fit.covariance;
   const auto n = std::ssize(input.log.visits);
   const auto predicted = predict_means_V(input.log, found.fit.parameters);
-  std::vector<PowersAllowance> of_axis(kAxisCount);
+  PerAxis<Eigen::MatrixXd> X;
+  PerAxis<EstimatedPowers> powers;
   parallel_for(kAxisCount, [&](std::size_t i) {
-    const Eigen::MatrixXd X = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
+    X[i] = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     const PooledNoise& noise = found.noise[i];
     const NoisePool pool(input.processes, record_of(input, i, found.coarse[i]), found.own_V2[i]);
-    const Eigen::MatrixXd design = independent_columns(X);
-    const EstimatedPowers powers = pool.estimated(noise, make_projector(noise.covariance, design).P,
-                                                  found.observed.mean_V[i] - predicted[i], design);
-    of_axis[i] = allowance_for_powers(input.processes, powers, noise.covariance, X, C);
+    const Eigen::MatrixXd design = independent_columns(X[i]);
+    powers[i] = pool.estimated(noise, make_projector(noise.covariance, design).P,
+                               found.observed.mean_V[i] - predicted[i], design);
+  });
+  // Whether there is slow noise at all, the axes of a triad say for one of which the steps of a
+  // coarser lattice hide most.
+  double gain_of_slow = 0;
+  for (const EstimatedPowers& of : powers) gain_of_slow = std::max(gain_of_slow, of.gain_of_slow);
+  std::vector<PowersAllowance> of_axis(kAxisCount);
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    if (input.log.codes[i].coarser_lattice) powers[i].gain_of_slow = gain_of_slow;
+    of_axis[i] =
+        allowance_for_powers(input.processes, powers[i], found.noise[i].covariance, X[i], C);
   });
   return with_allowance(C, of_axis);
 }

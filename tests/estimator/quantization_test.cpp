@@ -319,6 +319,8 @@ TEST(Calibrate, UsesTheCodesWhereStepsAreCoarseAndSaysSo) {
   const Calibration without = calibrate({coarse.run, &coarse.still, silent}, {});
   EXPECT_LT(error_over_sphere(with.estimates.batch_ls, coarse),
             0.5 * error_over_sphere(without.estimates.batch_ls, coarse));
+  for (const DetectionLimit& limit : without.diagnosis.not_found)
+    EXPECT_TRUE(std::isfinite(limit.limit) && limit.limit < 1) << limit.id;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     ASSERT_TRUE(with.quantization[axis]);
     EXPECT_NEAR(with.quantization[axis]->sigma_V, 1.2e-4, 0.15e-4);

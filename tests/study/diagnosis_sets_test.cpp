@@ -21,6 +21,30 @@ TEST(DiagnosisSets, TellsALagBehindTheTemperatureFromSlowNoise) {
   EXPECT_LT(outcome.after.heldout, 1.3 * outcome.oracle.heldout);
 }
 
+// Two names that happen to be slow come close, in noise that has to take up what they leave; then
+// one of the two is superfluous beside the other, and the rest is noise, too.
+TEST(DiagnosisSets, WhatNamesWouldLeaveToSlowNoiseIsCounted) {
+  SetDesign behind_temperature{.seed = 1330001,
+                               .effects = {"own.thermal_gradient"},
+                               .size = 3,
+                               .order = sim::RecordOrder::snake,
+                               .noise = NoiseKind::coloured,
+                               .bits = 16,
+                               .samples_per_pose = 40,
+                               .static_s = 300};
+  SetDesign behind_humidity = behind_temperature;
+  behind_humidity.effects = {"own.swelling"};
+  SetDesign coarse = behind_temperature;
+  coarse.seed = 1330005;
+  coarse.bits = 12;
+  coarse.static_s = 1800;
+  for (const SetDesign& design : {behind_temperature, behind_humidity, coarse}) {
+    const SetOutcome outcome = run_set(design);
+    expect_its_driver_and_no_listed_name(outcome);
+    EXPECT_LT(outcome.after.fresh, 1.2 * outcome.told_fresh) << outcome.truth;
+  }
+}
+
 // Shapes that a low polynomial or harmonic series does not have: what is left of them must not go
 // by listed names.
 TEST(DiagnosisSets, EffectsWithSharpShapesHaveTheirDriverAndNoListedName) {

@@ -101,6 +101,22 @@ TEST(DiagnosisStudy, ACoarserStepIsCalibratedFromItsCodes) {
   EXPECT_LT(outcome.worst_U0, 3);
 }
 
+// A model that holds the steps turns what is missing from it into whole steps, in which that hid.
+TEST(DiagnosisStudy, WhatElseAnAxisOfACoarserStepDoesIsFound) {
+  const SetOutcome outcome = run_set({.seed = 1510005,
+                                      .effects = {"sensor.temperature_scale", "adc.quantization"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::snake,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 16,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  ASSERT_TRUE(outcome.feasible);
+  EXPECT_EQ(outcome.named, 2) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+}
+
 // In serpentine order the shorter way round is the only one; between fresh poses it is not, and the
 // simulated head goes the other.
 TEST(DiagnosisStudy, FreshPosesTellWhichWayRoundTheHeadGoes) {
