@@ -238,7 +238,7 @@ void add_limits_of_samples(const MeasurementSet& run, const VisitLog& log,
   };
   const auto samples = static_cast<double>(run.samples.size());
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const double step_V = log.adc ? log.step_V(axis) : log.smallest_step_V[axis];
+    const double step_V = log.step_V(axis);
     const double sd_V = std::hypot(log.input_sd_V[axis], step_V / std::sqrt(12.0));
     const double K_V_per_g = std::abs(model[axis].value(static_cast<Eigen::Index>(axis)));
     const double limit_g = kSigmas * std::sqrt(2 / samples) * sd_V / K_V_per_g;

@@ -247,7 +247,7 @@ bool SearchModel::is_certain(const Candidate& candidate) const {
 }
 
 bool SearchModel::is_chosen(const Candidate& candidate) const {
-  if (is_certain(candidate)) return true;  // in the model from the start
+  if (is_certain(candidate)) return true;  // joins the model by itself
   return !candidate.effect->repeats() &&
          std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t k) {
            return list().candidates[k].effect == candidate.effect &&

@@ -234,6 +234,7 @@ void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log) {
 }
 
 double VisitLog::step_V(std::size_t axis) const {
+  if (!adc) return smallest_step_V[axis];
   if (codes[axis].coarser_lattice) return codes[axis].coarser_lattice->step_V;
   int missing = 0;
   for (const StuckBit& stuck : codes[axis].stuck_bits) missing = std::max(missing, stuck.bit + 1);
