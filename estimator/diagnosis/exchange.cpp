@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -18,6 +19,16 @@ namespace {
 /// By how much what takes another's place must be cheaper, in χ².
 constexpr double kWorthExchanging = 2;
 
+/// Which of some forty names it is, is one more choice for every name more, in χ².
+constexpr double kOfForty = 7.4;
+
+/// How many names beyond the first some of the model's effects have.
+double further_names(const SearchModel& model, const std::vector<std::size_t>& effects) {
+  std::set<const Effect*> names;
+  for (const std::size_t k : effects) names.insert(model.candidate(k).effect);
+  return names.empty() ? 0 : static_cast<double>(names.size() - 1);
+}
+
 /// Sum of squares of a fit. What a candidate makes of the first visit is a guess, which counts
 /// neither for it nor for what it would replace.
 double chi2_beside(const SearchModel& model, const Candidate& candidate, const EnlargedFit& fit) {
@@ -31,9 +42,9 @@ double chi2_beside(const SearchModel& model, const Candidate& candidate, const E
 
 /// Exchanges effects for others, and drops what that makes superfluous, unless slow noise would
 /// have to take up what the others leave: the noise as it stands was estimated beside what is to
-/// go. Whether it did.
+/// go. `more_names`: by how many the newcomers have more than the others. Whether it did.
 bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& effects,
-                           const std::vector<SearchModel::Entry>& with) {
+                           const std::vector<SearchModel::Entry>& with, double more_names) {
   PerAxis<bool> touched{};
   for (const std::size_t k : effects)
     for (const std::size_t axis : axes_of(model.stage().fit.parameters.effects[k]))
@@ -42,11 +53,8 @@ bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& e
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     has_slow = has_slow || (touched[axis] && has_slow_noise(model.input(), model.stage(), axis));
   if (!has_slow) return model.exchange(effects, with);
-  // Which of some forty names is one more choice for every effect more; in slow noise some two of
-  // them always come close.
-  constexpr double kOfForty = 7.4;
-  const double more =
-      kOfForty * static_cast<double>(std::max(with.size(), effects.size()) - effects.size());
+  // In slow noise some two names always come close.
+  const double more = kOfForty * more_names;
   const SearchModel before = model;
   const auto cost = [&](const SearchModel& of) {
     double sum = of.price();
@@ -169,7 +177,7 @@ bool exchange_one(SearchModel& model) {
                [&](std::size_t s) { exchanges[s] = exchanges_for(model, responses, subsets[s]); });
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     for (const SearchModel::Entry& with : exchanges[s])
-      if (exchange_in_own_noise(model, subsets[s], {with})) return true;
+      if (exchange_in_own_noise(model, subsets[s], {with}, 0)) return true;
   }
   return false;
 }
@@ -213,7 +221,8 @@ std::vector<SearchModel::Entry> one_kind_for(const SearchModel& model,
   std::vector<SearchModel::Entry> best;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return best;
-  double least_cost = model.stage().fit.chi2 + model.price_of(subset) - kWorthExchanging;
+  double least_cost = model.stage().fit.chi2 + model.price_of(subset) +
+                      kOfForty * further_names(model, subset) - kWorthExchanging;
   const CandidateGains gains(responses, without);
   for (const Kind& kind : kinds_on_axes(model, gains)) {
     constexpr double kMayGain = 1.5;  // more than to first order
@@ -252,7 +261,8 @@ bool exchange_for_one_kind(SearchModel& model) {
   const CandidateResponses& responses = model.responses();
   for (const auto& subset : subsets) {
     const std::vector<SearchModel::Entry> kind = one_kind_for(model, responses, subset);
-    if (!kind.empty() && exchange_in_own_noise(model, subset, kind)) return true;
+    if (!kind.empty() && exchange_in_own_noise(model, subset, kind, -further_names(model, subset)))
+      return true;
   }
   return false;
 }
@@ -410,12 +420,15 @@ bool name_unlisted(SearchModel& model) {
   for (std::size_t k = 0; k < model.size(); ++k) {
     if (model.candidate(k).has_name()) continue;
     const std::vector<SearchModel::Entry> parts = parts_with_names(model, responses, k);
-    if (!parts.empty() && exchange_in_own_noise(model, {k}, parts)) return true;
+    if (!parts.empty() &&
+        exchange_in_own_noise(model, {k}, parts, static_cast<double>(parts.size() - 1)))
+      return true;
   }
   const Named named = named_candidates(model);
   for (const auto& subset : subsets) {
     const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
-    if (!names.empty() && exchange_in_own_noise(model, subset, names)) return true;
+    const auto more = static_cast<double>(std::max(names.size(), subset.size()) - subset.size());
+    if (!names.empty() && exchange_in_own_noise(model, subset, names, more)) return true;
   }
   return false;
 }

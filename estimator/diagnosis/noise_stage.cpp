@@ -307,9 +307,15 @@ bool is_slow_in_order(const Eigen::VectorXd& values) {
 
 }  // namespace
 
+bool goes_ring_by_ring(const VisitLog& log) {
+  Eigen::VectorXd height(std::ssize(log.visits));
+  for (Eigen::Index k = 0; k < height.size(); ++k)
+    height(k) = std::sin(log.visits[static_cast<std::size_t>(k)].h_rad);
+  return is_slow_in_order(height);
+}
+
 Eigen::MatrixXd slow_functions(const VisitLog& log) {
-  const auto n = static_cast<Eigen::Index>(log.visits.size());
-  Eigen::MatrixXd functions(n, 0);
+  Eigen::MatrixXd functions(std::ssize(log.visits), 0);
   const auto add = [&](const auto& value_of) { append_centred(log, functions, value_of); };
   const double middle_s = 0.5 * (log.first_s() + log.last_s());
   add([&](const Visit& visit) { return visit.t_mean_s - middle_s; });
@@ -317,11 +323,7 @@ Eigen::MatrixXd slow_functions(const VisitLog& log) {
   if (log.has_temperature) add([](const Visit& visit) { return visit.temperature_K; });
   for (std::size_t c = 0; c < log.covariate_names.size(); ++c)
     add([c](const Visit& visit) { return visit.covariate[c]; });
-  // Where one ring is visited after the other, the height of the spindle is slow, too.
-  Eigen::VectorXd height(n);
-  for (Eigen::Index k = 0; k < n; ++k)
-    height(k) = std::sin(log.visits[static_cast<std::size_t>(k)].h_rad);
-  if (!is_slow_in_order(height)) return functions;
+  if (!goes_ring_by_ring(log)) return functions;
   for (const double power : {2.0, 3.0})
     add([power](const Visit& visit) { return std::pow(std::sin(visit.h_rad), power); });
   return functions;

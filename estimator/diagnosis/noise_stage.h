@@ -53,6 +53,9 @@ double deviance_of_axis(const SearchInput& input, const EnlargedParameters& para
 Eigen::MatrixXd with_allowance_for_noise(const SearchInput& input, const SearchResult& found,
                                          const Eigen::MatrixXd& jacobian);
 
+/// Whether the height of the spindle is slow: one ring is visited after the other.
+bool goes_ring_by_ring(const VisitLog& log);
+
 /// What changes slowly and could pass for slow noise: the time to the second order, powers of the
 /// height of the spindle where the order of the poses makes that slow, and what was
 /// recorded; n × any number, each centred and of unit length.

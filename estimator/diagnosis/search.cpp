@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -26,6 +27,18 @@ class Search {
 
   SearchResult run() {
     adopt_all_proven(false);
+    std::optional<SearchModel> start = model_;
+    explain_residual();
+    for (const std::size_t first : other_ways_in(*start)) try_beginning_with(first, *start);
+    start.reset();
+    adopt_all_proven(true);
+    SearchResult result = model_.take_result();
+    result.p_best_rest = p_best_rest_;
+    return result;
+  }
+
+ private:
+  void explain_residual() {
     grow();
     constexpr int kMostNamings = 3;
     for (int k = 0; k < kMostNamings && name_unlisted(model_); ++k) {
@@ -37,13 +50,62 @@ class Search {
          ++k)
       model_.drop_superfluous();
     model_.drop_what_excess_explains();
-    adopt_all_proven(true);
-    SearchResult result = model_.take_result();
-    result.p_best_rest = p_best_rest_;
-    return result;
   }
 
- private:
+  /// What comes first may stand for something else, and functions without a name then make up for
+  /// the difference. Where there are several of them, what else the search may begin with: the
+  /// likeliest of what moves the head, and of what has a name.
+  std::vector<std::size_t> other_ways_in(SearchModel& start) const {
+    std::size_t unnamed = 0;
+    for (std::size_t k = 0; k < model_.size(); ++k)
+      unnamed += model_.candidate(k).has_name() ? 0 : 1;
+    std::vector<std::size_t> ways;
+    if (unnamed < 2) return ways;
+    const CandidateGains gains(start.responses(), start.stage().fit);
+    bool has_head = false, has_named = false;
+    for (const Scored& s : screen(list_, gains, gains.of_residual())) {
+      const Candidate& c = list_.candidates[s.candidate];
+      const auto in_model = families();
+      if (std::binary_search(in_model.begin(), in_model.end(), c.family) || start.is_chosen(c))
+        continue;
+      const bool first_of_head = !has_head && c.effect->subject() == Subject::head;
+      const bool first_named = !has_named && c.has_name();
+      if (first_of_head || first_named) ways.push_back(s.candidate);
+      has_head = has_head || first_of_head;
+      has_named = has_named || first_named;
+    }
+    return ways;
+  }
+
+  /// Keeps what comes of it if that is clearly the likelier, at its price.
+  void try_beginning_with(std::size_t first, const SearchModel& start) {
+    constexpr double kClearly = 10;  // of −2 ln L
+    const SearchModel before = std::exchange(model_, start);
+    const double p_before = p_best_rest_;
+    model_.set_looks(before.looks());
+    const ActiveEffect active = list_.candidates[first].active();
+    const EnlargedFit with = model_.fit_with(model_.stage().fit.parameters, active);
+    const double cost = before.price() + deviance_in(before, before);
+    if (with.determined &&
+        model_.add({first,
+                    model_.p_of(list_.candidates[first],
+                                log_chi_squared_tail(model_.stage().fit.chi2 - with.chi2,
+                                                     static_cast<double>(active.free_count()))),
+                    with.parameters})) {
+      explain_residual();
+      if (model_.price() + deviance_in(model_, before) < cost - kClearly) return;
+    }
+    model_ = before;
+    p_best_rest_ = p_before;
+  }
+  /// −2 ln L of the readings as `as_freed` sees them.
+  double deviance_in(const SearchModel& model, const SearchModel& as_freed) const {
+    double sum = 0;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      sum += deviance_of_axis(input_, model.stage().fit.parameters, axis, as_freed.stage());
+    return sum;
+  }
+
   /// One effect after the other, until nothing is found.
   void grow() {
     // Where the best of the slow ones is superfluous as soon as it is there, so are the others.
@@ -51,7 +113,11 @@ class Search {
     // A train that takes the place of another could be followed by that again.
     constexpr int kMostTrains = 6;
     int trains = 0;  // looked for
-    while (model_.size() < options_.max_effects) {
+    // Each exchange is judged in the noise beside the model as it then is, so that two may take
+    // each other's place for ever.
+    constexpr int kMostReturns = 3;
+    std::map<std::vector<std::size_t>, int> returns;
+    while (model_.size() < options_.max_effects && returns[families()]++ <= kMostReturns) {
       const std::size_t before = model_.size();
       const bool found = add_one();
       if (!found && !(worth_slow_look && add_slow_one()) &&
@@ -62,6 +128,14 @@ class Search {
       tell_in_one(model_);
       if (!found) worth_slow_look = model_.size() > before;
     }
+  }
+
+  /// Of the effects in the model, in ascending order.
+  std::vector<std::size_t> families() const {
+    std::vector<std::size_t> all;
+    for (std::size_t k = 0; k < model_.size(); ++k) all.push_back(model_.candidate(k).family);
+    std::sort(all.begin(), all.end());
+    return all;
   }
 
   /// What the codes prove; coarser lattices last: until then readings are freed of them.

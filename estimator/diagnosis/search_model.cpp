@@ -129,10 +129,11 @@ double SearchModel::false_alarm(const Candidate& candidate) const {
 }
 
 PerAxis<double> SearchModel::false_alarm_of_slow() const {
+  const bool slow_positions = goes_ring_by_ring(input().log);
   PerAxis<double> share;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    share[axis] = stage_.coarse[axis] ? options().false_alarm_of_slow_when_coarse
-                                      : options().false_alarm_of_slow;
+    share[axis] = slow_positions && stage_.coarse[axis] ? options().false_alarm_of_slow_when_coarse
+                                                        : options().false_alarm_of_slow;
   return share;
 }
 
@@ -418,6 +419,7 @@ SearchResult SearchModel::take_result() {
     result.evidence[k] = {candidate(k), p_values_[k],
                           sigmas_of(log_chi_squared_tail(lost, dof_of(k)))};
   });
+  result.looks = looks_;
   responses();
   result.responses = std::move(*responses_);
   result.fit = std::move(stage_.fit);

@@ -237,7 +237,7 @@ class TermList {
   }
   void add_harmonics_of_delta(const DriverPointer& delta) {
     for (const Target& target : {kBias, kScale}) add(harmonic(delta, target, 3));
-    add(harmonic(delta, kH, 1));
+    for (const Target& target : {kH, kRoll}) add(harmonic(delta, target, 1));
     constexpr int kFirstUnlisted = 18;
     add(harmonic(delta, kDelta, kFirstUnlisted));
     for (const Target& angle : {kDelta, kH})

@@ -207,6 +207,17 @@ TEST(Structure, AWobbleThatGrowsWithTheWeightIsOneHarmonic) {
                         {"delta_deg", "geometry", "harmonic, times the cosine of h, added to h"});
 }
 
+// Where one ring is visited after the other at an even pace, a wave in the time is one in δ as
+// well, on these poses and on no others.
+TEST(Structure, ARollThatFollowsTheTurnIsNoWaveInTime) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.roll_error_deg = [](double delta_deg, double) {
+    return 0.4 * std::cos(2 * delta_deg * std::acos(-1.0) / 180 + 1);
+  };
+  expect_only_structure(options, {"delta_deg", "geometry", "harmonic, added to the base roll"});
+}
+
 // Between two rings h rises and time passes: the time would have to jump just there.
 TEST(Structure, ATiltThatJumpsBetweenTwoRingsJumpsInH) {
   SyntheticOptions options;

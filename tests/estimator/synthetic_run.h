@@ -32,8 +32,9 @@ struct SyntheticOptions {
   /// By how much the noise of x is larger, of the specific force in g and the time since arrival in
   /// s.
   std::function<double(const std::array<double, 3>&, double)> noise_x = {};
-  /// What is added to δ and to h at a position, degrees.
-  std::function<double(double delta_deg, double h_deg)> delta_error_deg = {}, h_error_deg = {};
+  /// What is added to δ, to h and to the base roll at a position, degrees.
+  std::function<double(double delta_deg, double h_deg)> delta_error_deg = {}, h_error_deg = {},
+                                                        roll_error_deg = {};
 };
 
 struct SyntheticRun {
@@ -69,7 +70,8 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
     const double delta_deg = to_delta_deg + error_deg(options.delta_error_deg);
     const double h_deg = to_h_deg + error_deg(options.h_error_deg);
     const double c = std::cos(h_deg * kRadians);
-    const double roll_rad = options.base_roll_rad ? options.base_roll_rad(t_s) : 0;
+    const double roll_rad = (options.base_roll_rad ? options.base_roll_rad(t_s) : 0) +
+                            error_deg(options.roll_error_deg) * kRadians;
     const double cd = std::cos(delta_deg * kRadians), sd = std::sin(delta_deg * kRadians);
     const double up[] = {c * std::cos(roll_rad), -std::sin(roll_rad),
                          std::sin(h_deg * kRadians) * std::cos(roll_rad)};
