@@ -122,14 +122,6 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
   return codes;
 }
 
-std::size_t CodeEstimate::place_in_whole(std::size_t effect) const {
-  std::vector<std::size_t> ascending = left_out;
-  std::sort(ascending.begin(), ascending.end());
-  for (const std::size_t before : ascending)
-    if (before <= effect) ++effect;
-  return effect;
-}
-
 EnlargedEstimate CodeEstimate::with_converter(const EnlargedEstimate& estimate,
                                               const SearchResult& found) const {
   EnlargedEstimate whole{found.fit.parameters, found.fit.covariance};

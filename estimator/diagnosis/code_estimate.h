@@ -18,8 +18,6 @@ struct CodeEstimate {
   /// deviation away, each independent of the others.
   std::vector<Eigen::VectorXd> deviation_V;
 
-  /// Where an effect of that model stands in the whole one.
-  std::size_t place_in_whole(std::size_t effect) const;
   /// An estimate of that model as one of the whole model `found`. How far noise rounds the steps
   /// off stays as the means have it: noise of every kind does.
   EnlargedEstimate with_converter(const EnlargedEstimate& estimate,

@@ -63,7 +63,6 @@ struct SearchResult {
   PerAxis<PooledNoise> noise;                ///< re-estimated under the final model
   PoseWhitening whitening;
   CandidateResponses responses;  ///< of the candidates beside the final model
-  double looks = 0;              ///< how many independent ones the search amounts to
   double p_best_rest = 1;        ///< p-value of the best candidate that was not taken
 
   /// Takes an effect out of the model and its evidence; the rest is to be fitted anew.

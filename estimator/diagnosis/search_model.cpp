@@ -419,7 +419,6 @@ SearchResult SearchModel::take_result() {
     result.evidence[k] = {candidate(k), p_values_[k],
                           sigmas_of(log_chi_squared_tail(lost, dof_of(k)))};
   });
-  result.looks = looks_;
   responses();
   result.responses = std::move(*responses_);
   result.fit = std::move(stage_.fit);

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "estimator/diagnosis/heldout.h"
-#include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/stuck_bits.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
@@ -175,53 +174,6 @@ void search_past_what_worsens(const SearchInput& search, const std::vector<PoseM
       candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
 }
 
-/// The least significant of the effects on axes of a coarser lattice, by the voltages that the
-/// codes tell; nothing where all are significant. The search saw means that were freed of rounding,
-/// which is not quite Gaussian where the steps are far coarser than the noise.
-std::optional<std::size_t> insignificant_by_codes(const VisitLog& log, const SearchResult& by_codes,
-                                                  double false_alarm) {
-  std::optional<std::size_t> weakest;
-  double most = false_alarm;
-  for (std::size_t k = 0; k < by_codes.evidence.size(); ++k) {
-    const ActiveEffect& active = by_codes.fit.parameters.effects[k];
-    const auto axes = axes_of(active);
-    if (std::none_of(axes.begin(), axes.end(),
-                     [&](std::size_t i) { return log.codes[i].coarser_lattice.has_value(); }) ||
-        active.effect->certain(log, active.axis))
-      continue;
-    const EnlargedFit without = fit_enlarged(log, by_codes.observed, by_codes.whitening,
-                                             without_effect(by_codes.fit.parameters, k));
-    if (!without.determined) continue;
-    const auto free = static_cast<double>(std::max<Eigen::Index>(1, active.free_count()));
-    const double p =
-        p_of_search(log_chi_squared_tail(std::max(0.0, without.chi2 - by_codes.fit.chi2), free),
-                    by_codes.looks);
-    if (p <= most) continue;
-    most = p;
-    weakest = k;
-  }
-  return weakest;
-}
-
-/// Without what the codes do not bear out.
-void keep_what_codes_bear_out(const SearchInput& search, const MeasurementSet& run,
-                              double false_alarm, ValidatedSearch& result) {
-  SearchResult& found = result.found;
-  bool dropped = false;
-  while (found.evidence.size() > 1) {
-    const auto codes = estimate_from_codes(search, run, found);
-    if (!codes) break;
-    const auto weakest = insignificant_by_codes(search.log, codes->before_converter, false_alarm);
-    if (!weakest) break;
-    found.remove(codes->place_in_whole(*weakest));
-    found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
-    dropped = true;
-  }
-  if (dropped)
-    found.responses =
-        candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
-}
-
 /// Leaves what carries over to poses that were left out.
 void keep_what_carries(const SearchInput& search, const std::vector<PoseMean>& poses,
                        ValidatedSearch& result) {
@@ -263,9 +215,6 @@ ValidatedSearch search_validated(const SearchInput& search, const CalibrationInp
   } else {
     result.candidates = all_candidates(search.log, own);
     search_past_what_worsens(search, poses, before_mps2, options, result);
-    if (std::any_of(search.log.codes.begin(), search.log.codes.end(),
-                    [](const CodeFaults& codes) { return codes.coarser_lattice.has_value(); }))
-      keep_what_codes_bear_out(search, measured.run, options.false_alarm, result);
   }
   if (!result.found.evidence.empty()) keep_what_carries(search, poses, result);
   return result;

@@ -399,10 +399,26 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
   return lattice;
 }
 
+namespace {
+
+/// With each point as it was read: what rounds may stand behind the declared converter, so that
+/// readings are no codes of that.
+void take_readings(Lattice& lattice, std::span<const double> u_V) {
+  const auto points = std::ssize(lattice.reading_V);
+  for (const double reading_V : u_V) {
+    const auto k =
+        static_cast<std::ptrdiff_t>(std::lround((reading_V - lattice.origin_V) / lattice.step_V));
+    if (k >= 0 && k < points) lattice.reading_V[static_cast<std::size_t>(k)] = reading_V;
+  }
+}
+
+}  // namespace
+
 CodeFaults code_faults(const MeasurementSet& set, std::size_t axis, const Adc& adc) {
   const std::vector<std::int64_t> codes = codes_seen(set.samples.u_V[axis], adc);
   CodeFaults faults{jumping_bits(set, axis, codes, adc),
                     coarser_lattice(codes, adc, dwells_over_codes(set, axis, adc))};
+  if (faults.coarser_lattice) take_readings(*faults.coarser_lattice, set.samples.u_V[axis]);
   for (const StuckBit& bit : stuck_bits(codes, adc))
     if (std::none_of(faults.stuck_bits.begin(), faults.stuck_bits.end(),
                      [&](const StuckBit& known) { return known.bit == bit.bit; }))

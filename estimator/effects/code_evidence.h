@@ -49,7 +49,7 @@ struct Lattice {
     double step_V = 0, origin_V = 0;
   };
   std::array<Offset, 2> deviation = {};
-  /// What the declared converter makes of each point from k = 0 on; NaN where it was not seen.
+  /// What each point from k = 0 on was read as; NaN where it was not seen.
   std::vector<double> reading_V = {};
 
   double u_step_V() const { return std::hypot(deviation[0].step_V, deviation[1].step_V); }

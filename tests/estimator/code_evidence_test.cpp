@@ -255,6 +255,23 @@ TEST(CodeFaults, ACoarserStepIsNoStuckBit) {
   EXPECT_NEAR(faults.coarser_lattice->step_V, 6 * kTwelveBits.lsb_V(), 2e-5);
 }
 
+// What rounds behind the converter knows nothing of its codes.
+TEST(CodeFaults, PointsOfACoarserStepAreWhatWasRead) {
+  MeasurementSet set = poses_with([](std::int64_t code) { return code; });
+  const double step_V = 6.3 * kTwelveBits.lsb_V();
+  for (double& u_V : set.samples.u_V[0]) u_V = step_V * std::round(u_V / step_V);
+  const auto lattice = code_faults(set, 0, kTwelveBits).coarser_lattice;
+  ASSERT_TRUE(lattice);
+  EXPECT_NEAR(lattice->step_V, step_V, 0.02 * kTwelveBits.lsb_V());
+  std::size_t seen = 0;
+  for (const double reading_V : lattice->reading_V) {
+    if (std::isnan(reading_V)) continue;
+    EXPECT_NEAR(reading_V, step_V * std::round(reading_V / step_V), 1e-9);
+    ++seen;
+  }
+  EXPECT_GT(seen, 3U);
+}
+
 TEST(CodeFaults, TheLowestBitAloneIsAlsoAStepOfTwiceTheSize) {
   const CodeFaults faults =
       code_faults(poses_with([](std::int64_t code) { return code | 1; }), 0, kTwelveBits);
