@@ -22,11 +22,11 @@ constexpr double kWorthExchanging = 2;
 /// Which of some forty names it is, is one more choice for every name more, in χ².
 constexpr double kOfForty = 7.4;
 
-/// How many names beyond the first some of the model's effects have.
+/// How many names beyond the first some of the model's effects have, of which there are any.
 double further_names(const SearchModel& model, const std::vector<std::size_t>& effects) {
   std::set<const Effect*> names;
   for (const std::size_t k : effects) names.insert(model.candidate(k).effect);
-  return names.empty() ? 0 : static_cast<double>(names.size() - 1);
+  return static_cast<double>(names.size() - 1);
 }
 
 /// Sum of squares of a fit. What a candidate makes of the first visit is a guess, which counts
@@ -56,16 +56,10 @@ bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& e
   // In slow noise some two names always come close.
   const double more = kOfForty * more_names;
   const SearchModel before = model;
-  const auto cost = [&](const SearchModel& of) {
-    double sum = of.price();
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      if (touched[axis])
-        sum += deviance_of_axis(model.input(), of.stage().fit.parameters, axis, before.stage());
-    return sum;
-  };
   if (!model.exchange(effects, with)) return false;
   model.drop_superfluous();
-  if (cost(model) + more < cost(before)) return true;
+  if (model.cost(before.stage(), touched) + more < before.cost(before.stage(), touched))
+    return true;
   model = before;
   return false;
 }

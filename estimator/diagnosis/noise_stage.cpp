@@ -135,13 +135,11 @@ bool lacks_lattice(const VisitLog& log, const EnlargedParameters& parameters, st
 
 /// Means of readings with what the declared converter made of each point of the lattice undone.
 Eigen::VectorXd on_lattice_V(const Lattice& lattice, const Eigen::VectorXd& mean_V) {
-  const auto points = std::ssize(lattice.reading_V);
   const auto nominal_V = [&](std::ptrdiff_t k) {
     return lattice.origin_V + lattice.step_V * static_cast<double>(k);
   };
   const auto reading_V = [&](std::ptrdiff_t k) {
-    const double seen_V = k >= 0 && k < points ? lattice.reading_V[static_cast<std::size_t>(k)]
-                                               : std::numeric_limits<double>::quiet_NaN();
+    const double seen_V = lattice.seen_V(static_cast<double>(k));
     return std::isnan(seen_V) ? nominal_V(k) : seen_V;
   };
   return mean_V.unaryExpr([&](double value_V) {

@@ -27,10 +27,9 @@ class Search {
 
   SearchResult run() {
     adopt_all_proven(false);
-    std::optional<SearchModel> start = model_;
+    const SearchModel start = model_;
     explain_residual();
-    for (const std::size_t first : other_ways_in(*start)) try_beginning_with(first, *start);
-    start.reset();
+    for (const std::size_t first : other_ways_in(start)) try_beginning_with(first, start);
     adopt_all_proven(true);
     SearchResult result = model_.take_result();
     result.p_best_rest = p_best_rest_;
@@ -55,17 +54,17 @@ class Search {
   /// What comes first may stand for something else, and functions without a name then make up for
   /// the difference. Where there are several of them, what else the search may begin with: the
   /// likeliest of what moves the head, and of what has a name.
-  std::vector<std::size_t> other_ways_in(SearchModel& start) const {
+  std::vector<std::size_t> other_ways_in(SearchModel start) const {
     std::size_t unnamed = 0;
     for (std::size_t k = 0; k < model_.size(); ++k)
       unnamed += model_.candidate(k).has_name() ? 0 : 1;
     std::vector<std::size_t> ways;
     if (unnamed < 2) return ways;
     const CandidateGains gains(start.responses(), start.stage().fit);
+    const std::vector<std::size_t> in_model = families();
     bool has_head = false, has_named = false;
     for (const Scored& s : screen(list_, gains, gains.of_residual())) {
       const Candidate& c = list_.candidates[s.candidate];
-      const auto in_model = families();
       if (std::binary_search(in_model.begin(), in_model.end(), c.family) || start.is_chosen(c))
         continue;
       const bool first_of_head = !has_head && c.effect->subject() == Subject::head;
@@ -80,30 +79,25 @@ class Search {
   /// Keeps what comes of it if that is clearly the likelier, at its price.
   void try_beginning_with(std::size_t first, const SearchModel& start) {
     constexpr double kClearly = 10;  // of −2 ln L
+    constexpr PerAxis<bool> kAll{true, true, true};
     const SearchModel before = std::exchange(model_, start);
     const double p_before = p_best_rest_;
     model_.set_looks(before.looks());
-    const ActiveEffect active = list_.candidates[first].active();
-    const EnlargedFit with = model_.fit_with(model_.stage().fit.parameters, active);
-    const double cost = before.price() + deviance_in(before, before);
-    if (with.determined &&
-        model_.add({first,
-                    model_.p_of(list_.candidates[first],
-                                log_chi_squared_tail(model_.stage().fit.chi2 - with.chi2,
-                                                     static_cast<double>(active.free_count()))),
-                    with.parameters})) {
-      explain_residual();
-      if (model_.price() + deviance_in(model_, before) < cost - kClearly) return;
+    const Candidate& candidate = list_.candidates[first];
+    const ActiveEffect active = candidate.active();
+    const EnlargedFit& alone = model_.stage().fit;
+    const EnlargedFit with = model_.fit_with(alone.parameters, active);
+    if (with.determined) {
+      const double log_p =
+          model_.log_p_of(first, alone, with, static_cast<int>(active.free_count()));
+      if (model_.add({first, model_.p_of(candidate, log_p), with.parameters})) {
+        explain_residual();
+        if (model_.cost(before.stage(), kAll) < before.cost(before.stage(), kAll) - kClearly)
+          return;
+      }
     }
     model_ = before;
     p_best_rest_ = p_before;
-  }
-  /// −2 ln L of the readings as `as_freed` sees them.
-  double deviance_in(const SearchModel& model, const SearchModel& as_freed) const {
-    double sum = 0;
-    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      sum += deviance_of_axis(input_, model.stage().fit.parameters, axis, as_freed.stage());
-    return sum;
   }
 
   /// One effect after the other, until nothing is found.

@@ -157,6 +157,13 @@ double SearchModel::price() const {
   return price_of(all);
 }
 
+double SearchModel::cost(const Stage& freed, const PerAxis<bool>& axes) const {
+  double sum = price();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    if (axes[axis]) sum += deviance_of_axis(input(), stage_.fit.parameters, axis, freed);
+  return sum;
+}
+
 double SearchModel::price_in(const EnlargedFit& with, std::size_t candidate) const {
   return price(candidate) + surcharge(input().log, with, with.parameters.effects.size() - 1);
 }

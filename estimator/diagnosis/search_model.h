@@ -62,6 +62,9 @@ class SearchModel {
   /// What some of the model's effects had to gain together.
   double price_of(const std::vector<std::size_t>& effects) const;
   double price() const;  ///< all of them
+  /// −2 ln L of the readings of some axes, as freed of rounding for `freed`, each axis in the noise
+  /// beside this model, and the price.
+  double cost(const Stage& freed, const PerAxis<bool>& axes) const;
 
   /// The candidates beside the model as it stands.
   const CandidateResponses& responses();

@@ -181,11 +181,9 @@ class Quantization final : public Effect {
     // The readings at hand need not be those that the step was found in: theirs may begin
     // elsewhere.
     if (const auto& lattice = input.log.codes[input.axis].coarser_lattice) {
-      const double place = std::round((at_V - lattice->origin_V) / lattice->step_V);
-      if (place >= 0 && place < static_cast<double>(lattice->reading_V.size())) {
-        const double seen_V = lattice->reading_V[static_cast<std::size_t>(place)];
-        if (std::abs(seen_V - at_V) < 0.5 * p[0]) return seen_V;  // NaN: never seen
-      }
+      const double seen_V =
+          lattice->seen_V(std::round((at_V - lattice->origin_V) / lattice->step_V));
+      if (std::abs(seen_V - at_V) < 0.5 * p[0]) return seen_V;  // NaN: never seen
     }
     const auto& adc = input.log.adc;
     return adc ? adc->min_V + adc->lsb_V() * std::round((at_V - adc->min_V) / adc->lsb_V()) : at_V;

@@ -391,12 +391,13 @@ std::optional<Lattice> coarser_lattice(const std::vector<std::int64_t>& codes, c
     const Eigen::Vector2d off = lsb_V * line.root_covariance.col(static_cast<Eigen::Index>(d));
     lattice.deviation.at(d) = {off(1), off(0)};
   }
-  lattice.reading_V.assign(static_cast<std::size_t>(std::lround(range / step)) + 2,
-                           std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t c = 0; c < codes.size(); ++c)
-    lattice.reading_V.at(static_cast<std::size_t>(points_seen[c])) =
-        front_V + lsb_V * steps_seen[c];
   return lattice;
+}
+
+double Lattice::seen_V(double point) const {
+  return point >= 0 && point < static_cast<double>(reading_V.size())
+             ? reading_V[static_cast<std::size_t>(point)]
+             : std::numeric_limits<double>::quiet_NaN();
 }
 
 namespace {
@@ -404,11 +405,13 @@ namespace {
 /// With each point as it was read: what rounds may stand behind the declared converter, so that
 /// readings are no codes of that.
 void take_readings(Lattice& lattice, std::span<const double> u_V) {
-  const auto points = std::ssize(lattice.reading_V);
   for (const double reading_V : u_V) {
-    const auto k =
-        static_cast<std::ptrdiff_t>(std::lround((reading_V - lattice.origin_V) / lattice.step_V));
-    if (k >= 0 && k < points) lattice.reading_V[static_cast<std::size_t>(k)] = reading_V;
+    const long k = std::lround((reading_V - lattice.origin_V) / lattice.step_V);
+    if (k < 0) continue;
+    const auto place = static_cast<std::size_t>(k);
+    if (place >= lattice.reading_V.size())
+      lattice.reading_V.resize(place + 1, std::numeric_limits<double>::quiet_NaN());
+    lattice.reading_V[place] = reading_V;
   }
 }
 

@@ -49,9 +49,10 @@ struct Lattice {
     double step_V = 0, origin_V = 0;
   };
   std::array<Offset, 2> deviation = {};
-  /// What each point from k = 0 on was read as; NaN where it was not seen.
+  /// What each point from k = 0 on was read as (code_faults()); NaN where it was not seen.
   std::vector<double> reading_V = {};
 
+  double seen_V(double point) const;  ///< reading_V of any point
   double u_step_V() const { return std::hypot(deviation[0].step_V, deviation[1].step_V); }
 };
 
