@@ -28,6 +28,19 @@ std::string right_aligned(const std::string& text, std::size_t width) {
   return columns >= width ? text : std::string(width - columns, ' ') + text;
 }
 
+/// Where the noise was identified; an axis that always read one code shows none.
+std::string noise_source_words(const PerAxis<NoiseModel>& noise) {
+  std::string source, silent;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (noise[axis].source == "none")
+      silent += fmt::format("{}{}", silent.empty() ? "" : ", ", kAxisName[axis]);
+    else
+      source = "noise from the " + noise[axis].source;
+  }
+  if (source.empty()) return "no noise to be seen";
+  return silent.empty() ? source : source + ", none to be seen on " + silent;
+}
+
 /// Nothing where there are none.
 std::string outlying_readings_line(const PerAxis<std::size_t>& outlying) {
   std::string text;
@@ -157,12 +170,12 @@ std::string conclusion(const RunDescription& description, const Calibration& cal
 std::string summary(const RunDescription& description, const Calibration& calibration,
                     const std::optional<Evaluation>& verification) {
   std::string text =
-      fmt::format("{}: {}, {}{}; noise from the {}\n", unit_name(description),
+      fmt::format("{}: {}, {}{}; {}\n", unit_name(description),
                   counted(calibration.poses, "pose"), counted(calibration.samples, "sample"),
                   calibration.skipped_rows == 0
                       ? ""
                       : fmt::format(", {} skipped", counted(calibration.skipped_rows, "bad row")),
-                  calibration.noise[0].source);
+                  noise_source_words(calibration.noise));
   text += outlying_readings_line(calibration.outlying_readings);
   text += parameter_rows(calibration.final.batch_ls);
   text += error_rows(calibration, verification);

@@ -74,6 +74,22 @@ void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& tria
   }
 }
 
+/// Of the Jacobian, those that belong to shapes.
+std::vector<Eigen::Index> columns_of_shapes(const EnlargedParameters& parameters) {
+  std::vector<Eigen::Index> columns;
+  for (std::size_t e = 0; e < parameters.effects.size(); ++e) {
+    const ActiveEffect& active = parameters.effects[e];
+    const auto infos = active.effect->parameters();
+    Eigen::Index column = parameters.first_free(e);
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (!active.free[k]) continue;
+      if (infos[k].role == ParameterRole::shape) columns.push_back(column);
+      ++column;
+    }
+  }
+  return columns;
+}
+
 /// Covariance of parameters from the columns of their whitened Jacobian.
 Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& whitened_jacobian) {
   const auto in_use = whitened_jacobian.topRows(rows_in_use(whitened_jacobian));
@@ -291,6 +307,18 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
         Eigen::MatrixXd damped = normal;
         damped.diagonal().array() += damping;
         try_step(damped.ldlt().solve(slope), true);
+      }
+      // A shape that changes next to nothing where it is would go anywhere: it stays there.
+      if (!improved) {
+        Eigen::MatrixXd held = normal;
+        Eigen::VectorXd slope_of_rest = slope;
+        for (const Eigen::Index shape : columns_of_shapes(fit.parameters)) {
+          held.row(shape).setZero();
+          held.col(shape).setZero();
+          held(shape, shape) = 1;
+          slope_of_rest(shape) = 0;
+        }
+        try_step(held.ldlt().solve(slope_of_rest), false);
       }
     }
     if (!improved) fit.converged = true;  // no direction leads down any more

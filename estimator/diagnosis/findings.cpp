@@ -48,6 +48,9 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
     if (active.free[k]) {
       parameter.estimated = true;
       parameter.u = std::sqrt(std::max(estimate.covariance(row, row), 0.0));
+      // Where the response does not change, what its slope says has no limit.
+      const double widest = active.effect->choice_uncertainty(log, active.axis, active.p, k);
+      if (widest > 0) parameter.u = std::min(parameter.u, widest);
       ++row;
     } else {
       parameter.u = active.effect->choice_uncertainty(log, active.axis, active.p, k);

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "estimator/effects/effect.h"
 
@@ -42,12 +44,30 @@ class CodeStep final : public Effect {
         others.push_back({{found.p[0], found.p[1] + side * sds * log.input_sd_V[axis]}});
     return others;
   }
+  // An edge that no reading sees lies somewhere between those next to it.
+  double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
+                            std::size_t k) const override {
+    if (k != kAt) return 0;
+    double below_V = -std::numeric_limits<double>::infinity();
+    double above_V = std::numeric_limits<double>::infinity();
+    for (const Visit& visit : log.visits) {
+      const double mean_V = visit.mean_V[axis];
+      if (mean_V < p[kAt])
+        below_V = std::max(below_V, mean_V);
+      else
+        above_V = std::min(above_V, mean_V);
+    }
+    return (above_V - below_V) / std::sqrt(12.0);
+  }
   double term_g(const TermInput& input, const double* p) const override {
-    const double at_V = p[1];
+    const double at_V = p[kAt];
     const double below =
         effect::share_below(at_V, input.output_V, input.log.input_sd_V[input.axis]);
     return p[0] / input.K_V_per_g * (1 - 2 * below);
   }
+
+ private:
+  static constexpr std::size_t kAt = 1;  // among its parameters
 };
 
 }  // namespace

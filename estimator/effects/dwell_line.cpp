@@ -352,9 +352,13 @@ std::optional<DwellLine> line_between_dwells(const MeasurementSet& set,
   const double width_hz = kPeriods / dwells.dwell_s();
   Eigen::FFT<double> transform;
   const Peak best = strongest_alias(dwells, 0.5 * width_hz, width_hz, transform);
-  // What is slower than two visits is a course of the whole run.
-  const double visits = static_cast<double>(dwells.t_s.size());
-  if (best.f_hz < 0.5 * visits / dwells.run_s()) return {};
+  // What is slower than two visits is a course of the whole run, and so is what may as well be
+  // slower than some more: between visits at even distances such a course has faster aliases.
+  const double visits_hz = static_cast<double>(dwells.t_s.size()) / dwells.run_s();
+  if (best.f_hz < 0.5 * visits_hz) return {};
+  const double slow_hz = 0.125 * visits_hz;
+  const Peak slow = peak_at(dwells, best_frequency(dwells, 0.5 * slow_hz, slow_hz, transform));
+  if (!is_clearly_likelier(best, slow, dwells)) return {};
   const double aliases = 1 + 2 * kRates;
   return line_of(dwells, best, aliases * width_hz * dwells.run_s());
 }

@@ -133,8 +133,8 @@ class Effect {
   virtual bool guesses_at_start() const { return false; }
   /// Whether the codes prove what hypotheses() lists, so that it joins the model unasked.
   virtual bool certain(const VisitLog&, std::size_t /*axis*/) const { return false; }
-  /// Standard uncertainty of parameter `k` where that is not fitted but the data narrow the choice
-  /// to a range.
+  /// Standard uncertainty of parameter `k` by the range to which the data narrow its choice: where
+  /// it is not fitted, and the most that it can be where it is; 0 where there is no such range.
   virtual double choice_uncertainty(const VisitLog&, std::size_t /*axis*/,
                                     const std::vector<double>& /*p*/, std::size_t /*k*/) const {
     return 0;

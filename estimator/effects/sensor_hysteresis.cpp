@@ -45,6 +45,16 @@ class Hysteresis final : public Effect {
     }
     return found;
   }
+  std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
+                                 const Hypothesis& found) const override {
+    const double so_far = commanded_change(log, 0, axis, found.p.data());
+    std::vector<Hypothesis> starts;
+    for (const Start start : {kRising, kFalling}) {
+      const std::vector<double> p = {found.p[0], static_cast<double>(start), found.p[2]};
+      if (commanded_change(log, 0, axis, p.data()) != so_far) starts.push_back({p});
+    }
+    return starts;
+  }
   double term_g(const TermInput& input, const double* p) const override {
     const auto ties = static_cast<Ties>(std::lround(p[2]));
     if (ties == kAsBefore) {
@@ -75,7 +85,7 @@ class Hysteresis final : public Effect {
 
  private:
   /// How the head came to its first pose, which nothing recorded says.
-  enum Start { kUnknown, kFromZero };
+  enum Start { kUnknown, kFromZero, kRising, kFalling };
   /// What is left where the force came back to what it was: nothing, or what was left before, which
   /// is by commanded angles, since true ones never come back. Symmetry brings it back often: two
   /// poses in a row at one h for z, cos 10° cos 20° = cos 20° cos 10° for x.
@@ -95,7 +105,9 @@ class Hysteresis final : public Effect {
   /// With how the head came to the first visit.
   static double at_the_start(const VisitLog& log, double first_g, std::size_t axis,
                              const double* p) {
-    if (std::lround(p[1]) == kUnknown) return 0;
+    const auto start = std::lround(p[1]);
+    if (start == kUnknown) return 0;
+    if (start != kFromZero) return start == kRising ? 1 : -1;
     return sign_of(first_g - specific_force_g({}, log.gamma)(static_cast<Eigen::Index>(axis)));
   }
   static double commanded_change(const VisitLog& log, std::size_t visit, std::size_t axis,

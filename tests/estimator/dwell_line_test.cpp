@@ -149,6 +149,19 @@ TEST(DwellLine, ACourseOfTheRunIsNoLine) {
   }
 }
 
+// In short dwells its aliases at the rate of the visits are as strong, and hardly change within a
+// dwell either: a sine of 34 visits was a line of 0.31 Hz.
+TEST(DwellLine, ASlowSineBetweenShortDwellsIsNoLine) {
+  MeasurementSet set = dwells(5, 0, 0, 0);
+  for (Pose& pose : set.poses) pose.count = 10;
+  for (const double visits : {10.0, 20.0, 34.0, 90.0}) {
+    Eigen::VectorXd left_V = left_by_attitudes(set);
+    for (Eigen::Index k = 0; k < left_V.size(); ++k)
+      left_V(k) += 1e-3 * std::sin(2 * std::numbers::pi * static_cast<double>(k) / visits);
+    EXPECT_FALSE(line_between_dwells(set, left_V)) << visits;
+  }
+}
+
 TEST(DwellLine, NoiseHasNone) {
   for (std::uint64_t seed = 10; seed < 20; ++seed)
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)

@@ -1,4 +1,4 @@
-// The study of the diagnosis on few sets; more of them are in diagnosis_sets_test.cpp, the whole
+// The study of the diagnosis on few sets; more of them are in diagnosis_*sets_test.cpp, the whole
 // one is scripts/study-diagnosis.
 #include "tests/study/diagnosis.h"
 
@@ -59,19 +59,6 @@ TEST(DiagnosisStudy, WhatFollowsTheTemperatureInTheRecordTooIsNotTakenForSmoothN
   // The room turns once, and what is drawn along is not yet drawn back: that it lags behind a play
   // shows on the little way back all the same, and matters for whatever is measured next.
   EXPECT_LT(outcome.after.fresh, 1.2 * outcome.oracle.fresh);
-}
-
-// Two of its edges were found first, as steps.
-TEST(DiagnosisStudy, WhatSwitchesOnAndOffIsATrainOfPulses) {
-  const SetOutcome outcome = run_set({.seed = 530001,
-                                      .effects = {"own.compressor"},
-                                      .size = 3,
-                                      .order = sim::RecordOrder::random,
-                                      .noise = NoiseKind::coloured,
-                                      .bits = 12,
-                                      .static_s = 300});
-  expect_its_driver_and_no_listed_name(outcome);
-  EXPECT_LT(outcome.after.heldout, 1.1 * outcome.oracle.heldout);
 }
 
 // What a product of components is on average has a listed name; together with what varies it is one
@@ -182,38 +169,6 @@ TEST(DiagnosisStudy, WhoIsToldTheEffectErrsAsMuch) {
   expect_only_finding(outcome);
   EXPECT_GT(outcome.told_fresh, 1.5 * outcome.oracle.fresh);
   EXPECT_LT(outcome.after.fresh, 1.05 * outcome.told_fresh);
-}
-
-// The motor current acts on the bias of z and on the scale of x. What is read back from the result
-// is what was found.
-TEST(DiagnosisStudy, AColumnMayActOnTheBiasOfOneAxisAndTheScaleOfAnother) {
-  const SetOutcome outcome =
-      run_set({.seed = 870073,
-               .effects = {"covariate:motor_A:bias", "covariate:motor_A:scale", "sensor.asymmetry"},
-               .size = 1,
-               .order = sim::RecordOrder::snake,
-               .noise = NoiseKind::coloured,
-               .bits = 16,
-               .samples_per_pose = 40,
-               .static_s = 300});
-  EXPECT_EQ(outcome.named, 3) << outcome.truth << " / " << outcome.found;
-  EXPECT_LT(outcome.after.fresh, 1.2 * outcome.oracle.fresh);
-}
-
-// Beside a degree of error of the head a sensor remembers where the head stood, not where it was
-// sent.
-TEST(DiagnosisStudy, SettlingIsToldFromAnErrorOfTheHeadThatChangesWithEveryPose) {
-  const SetOutcome outcome =
-      run_set({.seed = 880023,
-               .effects = {"covariate:supply_V:scale", "rig.delta_periodic", "sensor.settling"},
-               .size = 10,
-               .order = sim::RecordOrder::snake,
-               .noise = NoiseKind::examples,
-               .bits = 12,
-               .samples_per_pose = 40,
-               .static_s = 300});
-  EXPECT_EQ(outcome.named, 3) << outcome.truth << " / " << outcome.found;
-  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
 }  // namespace
