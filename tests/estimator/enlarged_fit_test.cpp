@@ -2,12 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <string>
 
-#include "estimator/effects/catalogue.h"
 #include "estimator/effects/driver.h"
 #include "estimator/effects/function_of_driver.h"
 #include "tests/estimator/synthetic_run.h"
@@ -82,28 +79,6 @@ TEST(EnlargedFit, IsNotDeterminedWhereASensitivityIsFarFromWhatAnyWas) {
   EXPECT_FALSE(fit_from(0.4, 0.4).determined);
   // The axes of a triad are alike: what one comes back to is no unlikely size.
   EXPECT_TRUE(fit_from(0.4, 1).determined);
-}
-
-// No mean of x lies near the step in its code: where exactly that is, no reading tells, and nothing
-// else found its way any more.
-TEST(EnlargedFit, AShapeThatChangesNothingDoesNotHoldUpTheOthers) {
-  SyntheticRun data = synthetic_run(3, kSixteenBits);
-  const VisitLog log = make_visit_log(data.run, data.description);
-  const auto effect = [](const std::string& id) {
-    const auto& all = effect_catalogue();
-    return *std::find_if(all.begin(), all.end(), [&](const Effect* e) { return e->id() == id; });
-  };
-  const double at_V = data.truth[0][3] + 0.5 * data.truth[0][0];
-  EnlargedParameters truth = truth_of(data);
-  truth = with_effect(truth, activate(*effect("adc.code_step"), 0, {{2e-4, at_V}}));
-  truth = with_effect(truth, activate(*effect("rig.tilt_index"), 0, {{0.4}}));
-  Observations observed = observe(data.run, log);
-  observed.mean_V = predict_means_V(log, truth);
-  EnlargedParameters start = truth;
-  start.effects[1].p[0] = 0.02;
-  const EnlargedFit fit = fit_enlarged(log, observed, white_noise(log), start);
-  EXPECT_NEAR(fit.parameters.effects[0].p[0], 2e-4, 1e-6);
-  EXPECT_NEAR(fit.parameters.effects[1].p[0], 0.4, 1e-3);
 }
 
 }  // namespace
