@@ -34,7 +34,7 @@ std::string noise_source_words(const PerAxis<NoiseModel>& noise) {
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     if (noise[axis].source == "none")
       silent += fmt::format("{}{}", silent.empty() ? "" : ", ", kAxisName[axis]);
-    else
+    else if (source.empty())
       source = "noise from the " + noise[axis].source;
   }
   if (source.empty()) return "no noise to be seen";
@@ -170,8 +170,8 @@ std::string conclusion(const RunDescription& description, const Calibration& cal
 std::string summary(const RunDescription& description, const Calibration& calibration,
                     const std::optional<Evaluation>& verification) {
   std::string text =
-      fmt::format("{}: {}, {}{}; {}\n", unit_name(description),
-                  counted(calibration.poses, "pose"), counted(calibration.samples, "sample"),
+      fmt::format("{}: {}, {}{}; {}\n", unit_name(description), counted(calibration.poses, "pose"),
+                  counted(calibration.samples, "sample"),
                   calibration.skipped_rows == 0
                       ? ""
                       : fmt::format(", {} skipped", counted(calibration.skipped_rows, "bad row")),

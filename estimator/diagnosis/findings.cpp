@@ -45,15 +45,14 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
     if (infos[k].role == ParameterRole::amplitude && !active.free[k]) continue;
     EffectParameter parameter{infos[k].name, std::nullopt, values[k], 0, infos[k].unit};
     parameter.unrecorded = infos[k].unrecorded;
+    const double by_range = active.effect->choice_uncertainty(log, active.axis, active.p, k);
+    parameter.u = by_range;
     if (active.free[k]) {
       parameter.estimated = true;
       parameter.u = std::sqrt(std::max(estimate.covariance(row, row), 0.0));
       // Where the response does not change, what its slope says has no limit.
-      const double widest = active.effect->choice_uncertainty(log, active.axis, active.p, k);
-      if (widest > 0) parameter.u = std::min(parameter.u, widest);
+      if (by_range > 0) parameter.u = std::min(parameter.u, by_range);
       ++row;
-    } else {
-      parameter.u = active.effect->choice_uncertainty(log, active.axis, active.p, k);
     }
     if (active.effect->subject() == Subject::sensor) parameter.axis = active.axis;
     if (infos[k].instant) place(log, parameter);

@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <vector>
 
 #include "estimator/effects/effect.h"
+#include "estimator/effects/place.h"
 
 namespace plumbline {
 namespace {
@@ -19,16 +19,15 @@ class CodeStep final : public Effect {
     return {{"c", "V", ParameterRole::amplitude}, {"at", "V", ParameterRole::shape, kFine_V, true}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    std::vector<double> means_V;
-    for (const Visit& visit : log.visits) means_V.push_back(visit.mean_V[axis]);
-    std::sort(means_V.begin(), means_V.end());
+    std::vector<double> sorted_V = means_V(log, axis);
+    std::sort(sorted_V.begin(), sorted_V.end());
     // All edges between the same two poses say the same; noise rounds a step off over some of its
     // standard deviations.
     const double apart_V = 1.5 * log.input_sd_V[axis];
     std::vector<Hypothesis> starts;
-    double last_V = means_V.front();
-    for (std::size_t k = 1; k < means_V.size(); ++k) {
-      const double at_V = 0.5 * (means_V[k - 1] + means_V[k]);
+    double last_V = sorted_V.front();
+    for (std::size_t k = 1; k < sorted_V.size(); ++k) {
+      const double at_V = 0.5 * (sorted_V[k - 1] + sorted_V[k]);
       if (at_V - last_V < apart_V) continue;
       starts.push_back({{1e-5, at_V}});
       last_V = at_V;
@@ -47,17 +46,7 @@ class CodeStep final : public Effect {
   // An edge that no reading sees lies somewhere between those next to it.
   double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {
-    if (k != kAt) return 0;
-    double below_V = -std::numeric_limits<double>::infinity();
-    double above_V = std::numeric_limits<double>::infinity();
-    for (const Visit& visit : log.visits) {
-      const double mean_V = visit.mean_V[axis];
-      if (mean_V < p[kAt])
-        below_V = std::max(below_V, mean_V);
-      else
-        above_V = std::min(above_V, mean_V);
-    }
-    return (above_V - below_V) / std::sqrt(12.0);
+    return k == kAt ? effect::u_between_neighbours(means_V(log, axis), p[kAt]) : 0;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double at_V = p[kAt];
@@ -68,6 +57,12 @@ class CodeStep final : public Effect {
 
  private:
   static constexpr std::size_t kAt = 1;  // among its parameters
+
+  static std::vector<double> means_V(const VisitLog& log, std::size_t axis) {
+    std::vector<double> all_V;
+    for (const Visit& visit : log.visits) all_V.push_back(visit.mean_V[axis]);
+    return all_V;
+  }
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "estimator/effects/driven_term.h"
+#include "estimator/effects/place.h"
 
 namespace plumbline {
 namespace {
@@ -282,12 +283,7 @@ class Step final : public DrivenTerm {
   /// A step that nothing moves between two values lies anywhere between them.
   double choice_uncertainty(const VisitLog&, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {
-    if (k != 0) return 0;
-    std::vector<double> values = variable().value[axis];
-    std::sort(values.begin(), values.end());
-    const auto next = std::upper_bound(values.begin(), values.end(), p[0]);
-    if (next == values.begin() || next == values.end()) return 0;
-    return (*next - *(next - 1)) / std::sqrt(12.0);
+    return k == 0 ? effect::u_between_neighbours(variable().value[axis], p[0]) : 0;
   }
 
  private:
