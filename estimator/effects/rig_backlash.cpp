@@ -8,7 +8,7 @@ namespace plumbline {
 namespace {
 
 // Where the head stood before the first visit, which nothing recorded says.
-enum Start { kUnknown, kFromZero, kLikeTheFirstTurn, kForwards, kBackwards };
+enum Start { kUnknown, kFromZero, kLikeTheFirstTurn, kStarts };
 // Which way it turns: places in Visit::delta_direction but for the last.
 enum Way { kShorter, kWithinTheTurn, kShorterOtherHalf, kOpenWay };
 
@@ -21,8 +21,8 @@ class Backlash final : public Effect {
   std::vector<ParameterInfo> parameters() const override {
     // way 0: the head goes the shorter way round; 1: it never passes 360°; 2: the shorter way, half
     // turns backwards; 3: the shorter way, whichever it is at half turns. start: how it came to
-    // its first angle: 0 with no play, 1 from δ = 0, 2 as in the first turn, 3 forwards, 4
-    // backwards. Nothing recorded says so, but of a rig that ran the plan itself the way is known.
+    // its first angle: 0 with no play, 1 from δ = 0, 2 as in the first turn. Nothing recorded says
+    // so, but of a rig that ran the plan itself the way is known.
     return {{"w", "deg", ParameterRole::amplitude},
             {.name = "way", .unit = "", .role = ParameterRole::index, .unrecorded = true},
             {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true}};
@@ -43,7 +43,7 @@ class Backlash final : public Effect {
         new_way &= !same_directions(log, way, other);
       if (!forward || !backward || !new_way) continue;
       std::vector<int> seen;  // starts that lead to the same direction are one
-      for (int start = kUnknown; start <= kLikeTheFirstTurn; ++start) {
+      for (int start = 0; start < kStarts; ++start) {
         const int direction = start_direction(log, 0, way, start);
         if (std::find(seen.begin(), seen.end(), direction) != seen.end()) continue;
         seen.push_back(direction);
@@ -51,18 +51,6 @@ class Backlash final : public Effect {
             {{effect::kSmallAngle_deg, static_cast<double>(way), static_cast<double>(start)}});
       }
     }
-    return starts;
-  }
-  std::vector<Hypothesis> closer(const VisitLog& log, std::size_t,
-                                 const Hypothesis& found) const override {
-    const auto direction = [&](int start) {
-      const auto way = static_cast<std::size_t>(std::lround(found.p[1]));
-      return way < kOpenWay ? start_direction(log, 0, way, start) : 0;
-    };
-    std::vector<Hypothesis> starts;
-    for (const Start start : {kForwards, kBackwards})
-      if (direction(start) != direction(static_cast<int>(std::lround(found.p[2]))))
-        starts.push_back({{found.p[0], found.p[1], static_cast<double>(start)}});
     return starts;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
@@ -82,7 +70,7 @@ class Backlash final : public Effect {
     std::vector<std::vector<double>> open;
     const bool halves = !same_directions(log, kShorter, kShorterOtherHalf);
     for (std::size_t way = 0; way <= kOpenWay; ++way) {
-      for (int start = kUnknown; start <= kLikeTheFirstTurn; ++start) {
+      for (int start = 0; start < kStarts; ++start) {
         const std::vector<double> other = {p[0], static_cast<double>(way),
                                            static_cast<double>(start)};
         const bool same_way = other[1] == p[1] || (!halves && way != kWithinTheTurn &&
@@ -127,8 +115,6 @@ class Backlash final : public Effect {
       for (const Visit& later : log.visits)
         if (later.delta_direction[way] != 0) return later.delta_direction[way];
     }
-    if (start == kForwards) return 1;
-    if (start == kBackwards) return -1;
     return 0;
   }
 };

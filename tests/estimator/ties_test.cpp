@@ -18,10 +18,10 @@ using testing::IsSupersetOf;
 
 constexpr double kHalfWidth_V = 3e-4;
 
-/// In random order, x off by ±half_width_V after its force rose or fell. Where it came back to what
+/// In random order, x off by ±kHalfWidth_V after its force rose or fell. Where it came back to what
 /// it was, `at_tie` makes the sign from the one before.
 template <typename AtTie>
-SyntheticRun with_hysteresis(AtTie at_tie, double half_width_V = kHalfWidth_V) {
+SyntheticRun with_hysteresis(AtTie at_tie) {
   SyntheticOptions options;
   options.samples_per_pose = 5;
   options.delta_step_deg = 10;
@@ -35,17 +35,17 @@ SyntheticRun with_hysteresis(AtTie at_tie, double half_width_V = kHalfWidth_V) {
       sign = std::abs(a_g - last_g) < kSame_g ? at_tie(sign) : (a_g > last_g ? 1 : -1);
     last_g = a_g;
     last_s = t_s;
-    return half_width_V * sign;
+    return kHalfWidth_V * sign;
   };
   return synthetic_run(3, kSixteenBits, options);
 }
 
-void expect_hysteresis_alone(const SyntheticRun& data, double half_width_V = kHalfWidth_V) {
+void expect_hysteresis_alone(const SyntheticRun& data) {
   const Calibration result = calibrated(data);
   ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "sensor.hysteresis")));
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
   const EffectParameter& w = result.diagnosis.effects[0].parameters[0];
-  EXPECT_NEAR(w.value, 2 * half_width_V / data.truth[0][0], 4 * w.u);
+  EXPECT_NEAR(w.value, 2 * kHalfWidth_V / data.truth[0][0], 4 * w.u);
 }
 
 // Symmetry brings the force of an axis back: cos 10° cos 20° is cos 20° cos 10°. With the wrong
@@ -62,42 +62,6 @@ TEST(Hysteresis, IsLeftOpenWhereTheForceComesBackAndNobodyKnows) {
   std::mt19937 random(5);
   expect_hysteresis_alone(
       with_hysteresis([=](double) mutable { return random() % 2 == 0 ? 1.0 : -1.0; }));
-}
-
-// Which way the head came to its first pose is not recorded, and need not be that from its zero:
-// a warm-up of one pose stood beside the effect.
-TEST(Hysteresis, MayHaveComeToItsFirstPoseEitherWay) {
-  constexpr double kWide_V = 2e-3;
-  SyntheticRun data = with_hysteresis([](double sign) { return sign; }, kWide_V);
-  const Pose& first = data.run.poses[0];
-  ASSERT_NE(first.delta_deg, 0) << "its force fell on the way from the zero";
-  for (std::size_t k = 0; k < first.count; ++k)
-    data.run.samples.u_V[0][first.first + k] += 2 * kWide_V;
-  expect_hysteresis_alone(data, kWide_V);
-}
-
-TEST(Backlash, MayHaveComeToItsFirstPoseEitherWay) {
-  SyntheticOptions options;
-  options.delta_step_deg = 10;
-  options.random_order = true;
-  constexpr double kHalfWidth_deg = 1;
-  options.delta_error_deg = [last_deg = 0.0, direction = 1.0, turns = 0](double delta_deg,
-                                                                         double) mutable {
-    const double turn_deg = std::remainder(delta_deg - last_deg, 360);
-    last_deg = delta_deg;
-    if (turn_deg != 0) {
-      // As on the way from the zero the other way round.
-      const bool to_the_first_pose = ++turns == 1;
-      direction = (turn_deg > 0) == to_the_first_pose ? -1 : 1;
-    }
-    return kHalfWidth_deg * direction;
-  };
-  const SyntheticRun data = synthetic_run(3, kSixteenBits, options);
-  const Calibration result = calibrated(data);
-  ASSERT_THAT(result.diagnosis.effects, ElementsAre(Field(&FoundEffect::id, "rig.backlash")));
-  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
-  const EffectParameter& w = result.diagnosis.effects[0].parameters[0];
-  EXPECT_NEAR(w.value, 2 * kHalfWidth_deg, 4 * w.u);
 }
 
 // One ring after the other z rises between two rings only: its hysteresis shows in the first ring
