@@ -331,5 +331,22 @@ TEST(DiagnosisSets, SettlingIsToldFromAnErrorOfTheHeadThatChangesWithEveryPose) 
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
+// The roll of the base alone explains little, so that three functions without a name had stood for it
+// and for the tilting floor: a search that begins with the roll finds both.
+TEST(DiagnosisSets, WhereFunctionsWithoutANameStandForTwoErrorsOfTheHeadTheSearchBeginsAgain) {
+  const SetOutcome outcome = run_set({.seed = 1700005,
+                                      .effects = {"rig.base_roll", "own.floor_tilt"},
+                                      .size = 5,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::examples,
+                                      .bits = 16,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_TRUE(outcome.driver_right) << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+}
+
 }  // namespace
 }  // namespace plumbline::study
