@@ -331,8 +331,8 @@ TEST(DiagnosisSets, SettlingIsToldFromAnErrorOfTheHeadThatChangesWithEveryPose) 
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
-// The roll of the base alone explains little, so that three functions without a name had stood for it
-// and for the tilting floor: a search that begins with the roll finds both.
+// The roll of the base alone explains little, so that three functions without a name had stood for
+// it and for the tilting floor: a search that begins with the roll finds both.
 TEST(DiagnosisSets, WhereFunctionsWithoutANameStandForTwoErrorsOfTheHeadTheSearchBeginsAgain) {
   const SetOutcome outcome = run_set({.seed = 1700005,
                                       .effects = {"rig.base_roll", "own.floor_tilt"},
