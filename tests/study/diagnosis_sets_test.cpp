@@ -342,8 +342,8 @@ TEST(DiagnosisSets, WhereFunctionsWithoutANameStandForTwoErrorsOfTheHeadTheSearc
                                       .bits = 16,
                                       .samples_per_pose = 40,
                                       .static_s = 300});
+  expect_its_driver_and_no_listed_name(outcome);
   EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
-  EXPECT_TRUE(outcome.driver_right) << outcome.found;
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
   EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
 }
