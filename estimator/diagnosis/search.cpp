@@ -26,11 +26,13 @@ class Search {
       : input_(input), list_(list), options_(options), model_(input, list, options) {}
 
   SearchResult run() {
-    adopt_all_proven(false);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (!has_lattice(axis)) adopt_all_proven(axis);
     const SearchModel start = model_;
     explain_residual();
     for (const std::size_t first : other_ways_in(start)) try_beginning_with(first, start);
-    adopt_all_proven(true);
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (has_lattice(axis)) adopt_lattice(axis);
     SearchResult result = model_.take_result();
     result.p_best_rest = p_best_rest_;
     return result;
@@ -100,6 +102,32 @@ class Search {
     p_best_rest_ = p_before;
   }
 
+  bool has_lattice(std::size_t axis) const {
+    return input_.log.codes[axis].coarser_lattice.has_value();
+  }
+
+  /// A coarser lattice joins last. Until then the readings are freed of rounding to it, but only as
+  /// well as noise smooths its steps, and effects may stand for what is left: they go where the
+  /// lattice without them costs less.
+  void adopt_lattice(std::size_t axis) {
+    std::vector<std::size_t> beside;
+    for (std::size_t k = 0; k < model_.size(); ++k)
+      if (model_.candidate(k).effect->subject() == Subject::sensor &&
+          model_.candidate(k).axis == axis)
+        beside.push_back(k);
+    std::optional<SearchModel> freed;
+    if (!beside.empty()) freed = model_;
+    adopt_all_proven(axis);
+    if (!freed || !freed->drop(beside)) return;
+    const SearchModel with = std::exchange(model_, *std::move(freed));
+    adopt_all_proven(axis);
+    PerAxis<bool> here{};
+    here[axis] = true;
+    if (model_.size() + beside.size() != with.size() ||
+        model_.cost(with.stage(), here) > with.cost(with.stage(), here))
+      model_ = with;
+  }
+
   /// One effect after the other, until nothing is found.
   void grow() {
     // Where the best of the slow ones is superfluous as soon as it is there, so are the others.
@@ -132,12 +160,10 @@ class Search {
     return all;
   }
 
-  /// What the codes prove; coarser lattices last: until then readings are freed of them.
-  void adopt_all_proven(bool lattices) {
+  void adopt_all_proven(std::size_t axis) {
     for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
       const Candidate& candidate = list_.candidates[c];
-      if (model_.is_certain(candidate) && !is_proven_otherwise(candidate) &&
-          input_.log.codes[candidate.axis].coarser_lattice.has_value() == lattices)
+      if (candidate.axis == axis && model_.is_certain(candidate) && !is_proven_otherwise(candidate))
         adopt_proven(c);
     }
   }

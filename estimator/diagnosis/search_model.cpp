@@ -362,10 +362,16 @@ double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without,
               log_chi_squared_tail((without.chi2 - stage_.fit.chi2) / excess, std::max(1.0, free)));
 }
 
-bool SearchModel::drop(std::size_t effect, const EnlargedFit& without) {
-  if (!adopt(without.parameters)) return false;
-  dropped_.push_back(candidate(effect).family);
-  forget(effect);
+bool SearchModel::drop(const std::vector<std::size_t>& effects) {
+  return drop(effects, fit_without(effects));
+}
+
+bool SearchModel::drop(const std::vector<std::size_t>& effects, const EnlargedFit& without) {
+  if (!without.determined || !adopt(without.parameters)) return false;
+  for (auto k = effects.rbegin(); k != effects.rend(); ++k) {
+    dropped_.push_back(candidate(*k).family);
+    forget(*k);
+  }
   return true;
 }
 
@@ -400,7 +406,7 @@ void SearchModel::drop_what_excess_explains() {
       weakest = k;
       without_weakest = std::move(without);
     }
-    if (!weakest || !drop(*weakest, without_weakest)) return;
+    if (!weakest || !drop({*weakest}, without_weakest)) return;
   }
 }
 
@@ -409,7 +415,7 @@ void SearchModel::drop_superfluous() {
     if (is_certain(candidate(k))) continue;
     const EnlargedFit without = fit_without({k});
     if (!without.determined || p_of_removal(k, without) < false_alarm(candidate(k))) continue;
-    drop(k, without);
+    drop({k}, without);
   }
 }
 

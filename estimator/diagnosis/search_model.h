@@ -90,6 +90,9 @@ class SearchModel {
   bool exchange(const std::vector<std::size_t>& effects, const Entry& with);
   /// With several, of which the last one's model holds all.
   bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
+  /// Goes on without some effects (ascending), which are not looked for again; false if that cannot
+  /// be.
+  bool drop(const std::vector<std::size_t>& effects);
   /// What a newcomer has made superfluous goes.
   void drop_superfluous();
   /// Where far more is left than the noise explains, what is found has to stand out of that: an
@@ -107,9 +110,7 @@ class SearchModel {
   void look_closer();
   void leave_ties_open();
   void forget(std::size_t effect);
-  /// Goes on with the fit without an effect, which is not looked for again; false if that cannot
-  /// be.
-  bool drop(std::size_t effect, const EnlargedFit& without);
+  bool drop(const std::vector<std::size_t>& effects, const EnlargedFit& without);
   /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;
   double p_of_removal(std::size_t effect, const EnlargedFit& without, double excess = 1) const;

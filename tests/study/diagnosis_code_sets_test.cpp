@@ -132,6 +132,22 @@ TEST(DiagnosisSets, AStuckBitHidesNothingElseOnItsAxis) {
   }
 }
 
+// Noise of a tenth of a step smooths the steps of the bit so little that seven steps of the codes
+// had stood for what was left of them, with K off by 74 of its uncertainties.
+TEST(DiagnosisSets, StepsOfTheCodesThatStoodForTheEdgesOfAStuckBitGo) {
+  const SetOutcome outcome = run_set({.seed = 1760517,
+                                      .effects = {"adc.stuck_bit"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::white,
+                                      .bits = 12,
+                                      .samples_per_pose = 40,
+                                      .static_s = 600});
+  expect_only_finding(outcome);
+  EXPECT_EQ(outcome.K_within, 9);
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+}
+
 // A step of 1.49 declared ones leaves every third code out, as one of 1.5 does.
 TEST(DiagnosisSets, AStepOfOneAndAHalfIsOnlySoWellKnown) {
   const SetOutcome outcome = run_set({.seed = 1360006,
