@@ -97,7 +97,7 @@ class Quantization final : public Effect {
     const double reach = 0.5 + effect::kReach * sd;
     double rounded_V = 0, below = 0;
     const double first = std::round(value - reach);
-    const auto points = static_cast<int>(std::ceil(value + reach + 1 - first));
+    const int points = effect::whole_numbers(first, std::ceil(value + reach));
     for (int k = 0; k < points; ++k) {
       const double point = first + k;
       const double upper = effect::share_below(point + 0.5, value, sd);
@@ -158,7 +158,7 @@ class Quantization final : public Effect {
     const double first = std::ceil((value_V - reach_V - adc.min_V) / declared_V - 0.5);
     const double last = std::floor((value_V + reach_V - adc.min_V) / declared_V - 0.5);
     double more_V = 0, slope = 0;
-    const auto codes = static_cast<int>(last - first) + 1;
+    const int codes = effect::whole_numbers(first, last);
     for (int k = 0; k < codes; ++k) {
       const double edge_V = adc.min_V + declared_V * (first + k + 0.5);
       const double finer_V = p[1] + p[0] * (std::floor((edge_V - p[1]) / p[0]) + 0.5);

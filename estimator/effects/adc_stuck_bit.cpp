@@ -39,8 +39,11 @@ class StuckBitEffect final : public Effect {
     const double sd = std::min(p[2] / size_V, effect::kMostNoise);
     const bool set = p[1] > 0.5;
     double wrong = 0;
-    for (double from = std::floor(value - effect::kReach * sd); from <= value + effect::kReach * sd;
-         ++from) {
+    const double first = std::floor(value - effect::kReach * sd);
+    // Counted: where a fit strays to 1e16 steps, one more is the same number.
+    const int steps = effect::whole_numbers(first, value + effect::kReach * sd);
+    for (int k = 0; k < steps; ++k) {
+      const double from = first + k;
       const bool is_set = std::fmod(std::abs(from), 2) == 1;
       if (is_set == set) continue;
       wrong += effect::share_below(from + 1, value, sd) - effect::share_below(from, value, sd);

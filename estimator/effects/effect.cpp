@@ -31,6 +31,11 @@ double share_below(double edge, double value, double sd) {
   return normal_below((edge - value) / sd);
 }
 
+int whole_numbers(double first, double last) {
+  const double count = std::floor(last) - first + 1;
+  return count >= 1 ? static_cast<int>(std::min(count, 1e9)) : 0;  // NaN: none
+}
+
 int positions_of_a_turn(std::vector<double> angles_rad) {
   constexpr double kNear_rad = 1e-3;
   std::sort(angles_rad.begin(), angles_rad.end());

@@ -208,6 +208,9 @@ std::vector<double> geometric(double first, double last, int count);
 /// Share of Gaussian noise of standard deviation `sd` about `value` that lies below `edge`; with no
 /// noise 0 or 1.
 double share_below(double edge, double value, double sd);
+/// How many whole numbers there are from the whole number `first` to `last`. None where a fit has
+/// strayed so far that they are not finite.
+int whole_numbers(double first, double last);
 inline constexpr double kLeastNoise = 0.02;  ///< steps, where a search for more starts
 inline constexpr double kMostNoise = 3;      ///< steps, beyond which nothing of them is left
 inline constexpr double kReach = 6;  ///< standard deviations beyond which noise does not come

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <set>
@@ -350,6 +351,26 @@ TEST(Quantization, IsTheSameInASetThatBeginsAtAnotherCode) {
   with.effects = {
       activate(catalogued("adc.quantization"), 0, {{kStep_V, origin_V, 0.2 * kStep_V}})};
   EXPECT_LT((predict_means_V(found, with)[0] - predict_means_V(later, with)[0]).norm(), 1e-12);
+}
+
+// A fit may try what sends an axis far beyond all steps of the converter, where one more is none.
+TEST(Converter, APredictionEndsHoweverFarBeyondItsRange) {
+  VisitLog log = example_log();
+  ASSERT_TRUE(log.adc);
+  const double step_V = log.adc->lsb_V();
+  const auto with = [&](const char* id, const std::vector<double>& p) {
+    return activate(catalogued(id), 0, {p});
+  };
+  EnlargedParameters model = twelve();
+  model.effects = {with("adc.stuck_bit", {3, 1, step_V}),
+                   with("adc.quantization", {4 * step_V, -2.5, step_V}),
+                   with("adc.quantization", {0.5 * step_V, -2.5, step_V})};
+  for (const double far_V : {1e3, 1e14, 1e17, -1e17, 1e300}) {
+    model.twelve[0](3) = far_V;
+    EXPECT_TRUE(predict_means_V(log, model)[0].allFinite()) << far_V;
+  }
+  model.twelve[0](3) = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(predict_means_V(log, model)[0].allFinite());
 }
 
 TEST(CodeStep, LiesWhereTheConverterIsGivenItWhateverMakesTheVoltage) {
