@@ -118,11 +118,14 @@ class BitsGivenBack {
   bool blurs_dwells(std::size_t axis) const {
     constexpr double kBlurs =
         0.2;  // of the lowest bit's weight; 1 in 160 readings lies beyond half
-    return sharp_[axis] && raw_.input_sd_V[axis] >
-                               kBlurs * weight_V(raw_.codes[axis].stuck_bits.front(), *raw_.adc);
+    return sharp_[axis] && raw_.input_sd_V[axis] > kBlurs * lowest_V(axis);
   }
   bool any() const { return sharp_[0] || sharp_[1] || sharp_[2]; }
   bool on(std::size_t axis) const { return sharp_[axis]; }
+  /// Weight of the lowest bit.
+  double lowest_V(std::size_t axis) const {
+    return weight_V(raw_.codes[axis].stuck_bits.front(), *raw_.adc);
+  }
   const MeasurementSet& run() const { return run_; }
   /// Variance that the means have beyond those of whole readings; empty on other axes.
   const Eigen::VectorXd& extra_V2(std::size_t axis) const { return extra_V2_[axis]; }
@@ -137,10 +140,10 @@ class BitsGivenBack {
     };
     // Most dwells say by themselves how far off expectations are, which tells the others more.
     constexpr double kMostOff = 0.25, kLeastOff = 0.03;  // of the lowest bit's weight
-    const double lowest_V = weight_V(raw_.codes[axis].stuck_bits.front(), *raw_.adc);
-    std::vector<double> u_V = given_back(kMostOff * lowest_V);
+    const double bit_V = lowest_V(axis);
+    std::vector<double> u_V = given_back(kMostOff * bit_V);
     const double off_V = usual_distance_V(u_V, expected_V);
-    u_V = given_back(std::clamp(off_V, kLeastOff * lowest_V, kMostOff * lowest_V));
+    u_V = given_back(std::clamp(off_V, kLeastOff * bit_V, kMostOff * bit_V));
     constexpr double kAnother = 0.1;  // standard deviations of a reading
     const auto& before_V = run_.samples.u_V[axis];
     const bool another =
@@ -205,12 +208,35 @@ class BitsGivenBack {
   PerAxis<Eigen::VectorXd> extra_V2_;
 };
 
+/// Whether what an effect of a model does to its axis is to jump by the weight of a bit once, or
+/// there and back, give or take what else it takes up.
+bool jumps_by(double weight_V, const VisitLog& log, const EnlargedParameters& model,
+              std::size_t effect) {
+  constexpr double kNearly = 0.25;
+  const ActiveEffect& active = model.effects[effect];
+  if (active.effect->subject() == Subject::head) return false;
+  const Eigen::VectorXd change_V = predict_means_V(log, model)[active.axis] -
+                                   predict_means_V(log, without_effect(model, effect))[active.axis];
+  int jumps = 0;
+  for (Eigen::Index k = 1; k < change_V.size(); ++k) {
+    const double jump = std::abs(change_V(k) - change_V(k - 1)) / weight_V;
+    if (jump < kNearly) continue;
+    if (std::abs(jump - 1) > kNearly) return false;
+    ++jumps;
+  }
+  return jumps == 1 || jumps == 2;
+}
+
 /// Where the visits' voltages are expected by all that the others tell of them. What concerns one
-/// visit only could be a bit that was not given back rightly.
-Eigen::VectorXd expected_V(const VisitLog& log, const SearchResult& found, std::size_t axis) {
+/// visit only, or is of the weight of the bit from one instant to another, could be a bit that was
+/// not given back rightly.
+Eigen::VectorXd expected_V(const VisitLog& log, const SearchResult& found, std::size_t axis,
+                           double weight_V) {
   EnlargedParameters shared = found.fit.parameters;
-  std::erase_if(shared.effects,
-                [](const ActiveEffect& active) { return active.effect->concerns_one_visit(); });
+  for (std::size_t k = shared.effects.size(); k-- > 0;)
+    if (shared.effects[k].effect->concerns_one_visit() ||
+        (shared.effects[k].axis == axis && jumps_by(weight_V, log, shared, k)))
+      shared = without_effect(std::move(shared), k);
   const Eigen::VectorXd predicted_V = predict_means_V(log, shared)[axis];
   return predicted_V + expected_from_others(found.noise[axis].covariance,
                                             found.observed.mean_V[axis] - predicted_V);
@@ -315,7 +341,8 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
     start.twelve = without.fit.parameters.twelve;
     bool settled = true;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      if (bits.on(axis) && bits.about(axis, expected_V(log, without, axis))) settled = false;
+      if (bits.on(axis) && bits.about(axis, expected_V(log, without, axis, bits.lowest_V(axis))))
+        settled = false;
     if (!settled && searches < kMostSearches) continue;
     if (without.evidence.size() < limited.max_effects || limited.max_effects == options.max_effects)
       break;

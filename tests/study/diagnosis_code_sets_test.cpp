@@ -132,6 +132,21 @@ TEST(DiagnosisSets, AStuckBitHidesNothingElseOnItsAxis) {
   }
 }
 
+// Until the warm-up is known, poses near an edge of the bit are expected on its wrong side: steps
+// of the bit's weight had stood for them, and kept the readings there.
+TEST(DiagnosisSets, JumpsByTheWeightOfAStuckBitAreNoStepsOfTheBias) {
+  const SetOutcome outcome = run_set({.seed = 1820002,
+                                      .effects = {"sensor.warmup", "adc.stuck_bit"},
+                                      .size = 10,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 16,
+                                      .samples_per_pose = 40,
+                                      .static_s = 300});
+  EXPECT_EQ(outcome.named, 2) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
 // Noise of a tenth of a step smooths the steps of the bit so little that seven steps of the codes
 // had stood for what was left of them, with K off by 74 of its uncertainties.
 TEST(DiagnosisSets, StepsOfTheCodesThatStoodForTheEdgesOfAStuckBitGo) {
