@@ -405,6 +405,45 @@ std::vector<SearchModel::Entry> parts_with_names(const SearchModel& model,
   return parts;
 }
 
+/// Instead of an effect without a name a function of the same driver that has fewer parameters by
+/// two or more, and a candidate with a name; empty if no two are worth their price.
+std::vector<SearchModel::Entry> simpler_with_name(const SearchModel& model,
+                                                  const CandidateResponses& responses,
+                                                  const Named& named, std::size_t effect) {
+  std::vector<SearchModel::Entry> best;
+  const EnlargedFit without = model.fit_without({effect});
+  if (!without.determined) return best;
+  constexpr std::size_t kMostRefined = 3;
+  std::size_t refined = 0;
+  const Candidate& replaced = model.candidate(effect);
+  const auto parameters = [](const Candidate& candidate) {
+    return candidate.active().free_count();
+  };
+  double least_cost = model.stage().fit.chi2 + model.price_of({effect}) - kWorthExchanging;
+  const CandidateGains gains(responses, without);
+  const Eigen::VectorXd first_order = gains.of_residual();
+  for (const Scored& s : screen(model.list(), gains, first_order)) {
+    const Candidate& simpler = model.list().candidates[s.candidate];
+    if (simpler.has_name() || simpler.effect->id() != replaced.effect->id() ||
+        simpler.axis != replaced.axis || parameters(simpler) + 1 >= parameters(replaced))
+      continue;
+    if (refined++ == kMostRefined) break;
+    const EnlargedFit fit = model.fit_with(gains, s.candidate, simpler,
+                                           first_order(static_cast<Eigen::Index>(s.candidate)));
+    if (!fit.determined) continue;
+    const double price = model.price_in(fit, s.candidate);
+    std::optional<Next> next =
+        likeliest_beside(model, named, fit, 1, fit.chi2 + price - least_cost);
+    if (!next) continue;
+    const double cost = next->fit.chi2 + price + model.price_in(next->fit, next->entry.candidate);
+    if (cost >= least_cost) continue;
+    least_cost = cost;
+    const double p = model.p_of(simpler, model.log_p_of(s.candidate, without, fit, s.dof));
+    best = {{s.candidate, p, fit.parameters}, std::move(next->entry)};
+  }
+  return best;
+}
+
 }  // namespace
 
 bool name_unlisted(SearchModel& model) {
@@ -423,6 +462,13 @@ bool name_unlisted(SearchModel& model) {
     const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
     const auto more = static_cast<double>(std::max(names.size(), subset.size()) - subset.size());
     if (!names.empty() && exchange_in_own_noise(model, subset, names, more)) return true;
+  }
+  for (std::size_t k = 0; k < model.size(); ++k) {
+    const Candidate& chosen = model.candidate(k);
+    if (chosen.has_name() || chosen.effect->subject() != Subject::head) continue;
+    const std::vector<SearchModel::Entry> two =
+        simpler_with_name(model, model.responses(), named, k);
+    if (!two.empty() && exchange_in_own_noise(model, {k}, two, 1)) return true;
   }
   return false;
 }

@@ -18,7 +18,8 @@ bool exchange_one(SearchModel& model);
 bool exchange_for_one_kind(SearchModel& model);
 
 /// What has no name gives way to effects that have one, as many as it takes, where these are worth
-/// their price: two of them together may have looked like one structure.
+/// their price: two of them together may have looked like one structure. What moves the head and
+/// has no name gives way to less of the same beside one with a name, too. Whether anything did.
 bool name_unlisted(SearchModel& model);
 
 /// The same for effect k where it is slow and there is slow noise: the rivals are compared each

@@ -348,5 +348,21 @@ TEST(DiagnosisSets, WhereFunctionsWithoutANameStandForTwoErrorsOfTheHeadTheSearc
   EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
 }
 
+// A straight line that does not close after a turn, and an error of the tilt: one wave that does
+// not close is both, and has a shape more.
+TEST(DiagnosisSets, OneFunctionOfTheTurnThatStandsForALineAndATiltGivesWayToThem) {
+  const SetOutcome outcome = run_set({.seed = 1850003,
+                                      .effects = {"rig.tilt_index", "own.cable_pull"},
+                                      .size = 5,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::white,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 300});
+  expect_its_driver_and_no_listed_name(outcome);
+  EXPECT_EQ(outcome.named, 1) << outcome.truth << " / " << outcome.found;
+  EXPECT_EQ(outcome.wrong, 0) << outcome.found;
+}
+
 }  // namespace
 }  // namespace plumbline::study
