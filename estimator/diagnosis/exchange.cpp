@@ -466,8 +466,7 @@ bool name_unlisted(SearchModel& model) {
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& chosen = model.candidate(k);
     if (chosen.has_name() || chosen.effect->subject() != Subject::head) continue;
-    const std::vector<SearchModel::Entry> two =
-        simpler_with_name(model, model.responses(), named, k);
+    const std::vector<SearchModel::Entry> two = simpler_with_name(model, responses, named, k);
     if (!two.empty() && exchange_in_own_noise(model, {k}, two, 1)) return true;
   }
   return false;

@@ -160,6 +160,7 @@ class Search {
     return all;
   }
 
+  /// What the codes of an axis prove.
   void adopt_all_proven(std::size_t axis) {
     for (std::size_t c = 0; c < list_.candidates.size(); ++c) {
       const Candidate& candidate = list_.candidates[c];
