@@ -95,8 +95,9 @@ struct SeparatingPlan {
 
 /// What these data cannot tell a finding from, and what would.
 struct Ambiguity {
-  std::vector<std::string> alternatives;  ///< listed effects and sums of them
-  std::string separate_by;                ///< words
+  /// Listed effects and sums of them; of a structure others, too: "unlisted:DRIVER:FORM".
+  std::vector<std::string> alternatives;
+  std::string separate_by;         ///< words
   SeparatingPlan separating_plan;  ///< no stops: nothing to decide, or poses do not decide it
 };
 

@@ -77,10 +77,16 @@ void add_terms(const Composer& c) {
         effect.definition.empty() ? effect_term(effect.id, c.tr) : one_line(effect.definition);
     if (!term.empty()) facts.rows.emplace_back(effect_name(effect.id, c.tr), term);
   }
-  for (const UnlistedStructure& found : c.input.calibration.diagnosis.unlisted)
+  for (const UnlistedStructure& found : c.input.calibration.diagnosis.unlisted) {
+    const auto says_where = [](const EffectParameter& p) { return p.name == "ref"; };
+    std::string text;
+    if (std::any_of(found.parameters.begin(), found.parameters.end(), says_where))
+      text = c.tr("zero where {} = ref: there the twelve parameters are stated", found.driver);
     if (found.driver == kTemperatureColumn)
-      facts.rows.emplace_back(unlisted_name(found, c.tr),
-                              c.tr("temp_C is counted from the reference temperature: T − T₀"));
+      text += (text.empty() ? "" : "; ") +
+              c.tr("temp_C is counted from the reference temperature: T − T₀");
+    if (!text.empty()) facts.rows.emplace_back(unlisted_name(found, c.tr), text);
+  }
   if (facts.rows.empty()) return;
   c.add(Paragraph{c.tr("The added terms; a in g, those of an output referred to its input:")});
   c.add(std::move(facts));

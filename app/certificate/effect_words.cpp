@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string_view>
 #include <utility>
 
 #include "app/certificate/rounding.h"
@@ -68,8 +69,21 @@ const EffectWords* words_of(const std::string& id) {
   return it == kEffects.end() ? nullptr : it;
 }
 
+std::string structure_name(const std::string& driver, std::string_view form, const Translator& tr) {
+  const std::string subject = form == "bias"       ? tr("the bias")
+                              : form == "scale"    ? tr("the scale factor")
+                              : form == "geometry" ? tr("the geometry of the head")
+                                                   : tr("the readings within a dwell");
+  return tr("not among the listed effects: {} follows {}", subject, driver);
+}
+
 std::string one_name(const std::string& id, const Translator& tr) {
   if (const EffectWords* words = words_of(id)) return tr(words->name);
+  constexpr std::string_view kStructure = "unlisted:";  // unlisted:DRIVER:FORM
+  if (const std::size_t form = id.rfind(':');
+      id.starts_with(kStructure) && form > kStructure.size())
+    return structure_name(id.substr(kStructure.size(), form - kStructure.size()),
+                          std::string_view(id).substr(form + 1), tr);
   if (const auto column = covariate_column(id))
     return tr("influence of the recorded column {}", *column);
   return id;
@@ -171,11 +185,7 @@ std::string unlisted_name(const UnlistedStructure& found, const Translator& tr) 
     return tr("not among the listed effects: the bias wanders beyond the static record");
   if (found.is_of_noise())
     return tr("not among the listed effects: the noise follows {}", found.driver);
-  const std::string form = found.form == "bias"       ? tr("the bias")
-                           : found.form == "scale"    ? tr("the scale factor")
-                           : found.form == "geometry" ? tr("the geometry of the head")
-                                                      : tr("the readings within a dwell");
-  return tr("not among the listed effects: {} follows {}", form, found.driver);
+  return structure_name(found.driver, found.form, tr);
 }
 
 }  // namespace plumbline::app

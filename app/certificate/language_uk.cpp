@@ -370,6 +370,7 @@ const Catalogue& catalogue() {
     {"ka·|a_i|", "ka·|a_i|"},
     {"k_xy·a_x·a_y + k_xz·a_x·a_z + k_yz·a_y·a_z", "k_xy·a_x·a_y + k_xz·a_x·a_z + k_yz·a_y·a_z"},
     {"+w/2 where a_i rose on the way to the position, −w/2 where it fell; start: how the first position was reached", "+w/2, якщо a_i на шляху до положення зросло, −w/2, якщо спало; start: як досягнуто першого положення"},
+    {"zero where {} = ref: there the twelve parameters are stated", "нуль, де {} = ref: там визначено дванадцять параметрів"},
     {"temp_C is counted from the reference temperature: T − T₀",
      "temp_C відлічується від опорної температури: T − T₀"},
     {"b1·(T − T₀)", "b1·(T − T₀)"},
@@ -536,6 +537,8 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"turn the base by 180° in azimuth and measure again: a field of the room stays, the head turns along", "повернути основу на 180° за азимутом і виміряти знову: поле приміщення лишається, головка повертається"},
     {"turn the base by 180° in azimuth and measure again: a field of the room stays", "повернути основу на 180° за азимутом і виміряти знову: поле приміщення лишається"},
     {"mount the triad turned by 90° about its z axis, then tipped over, and measure again: what belongs to the sensor turns along, what belongs to the head does not", "установити тріаду повернутою на 90° навколо її осі z, потім перекинутою, і виміряти знову: що належить давачеві, повертається з ним, що належить головці — ні"},
+    {"measure again while {} takes another course", "виміряти знову, коли {} змінюється інакше"},
+    {"measure again while {} take other courses", "виміряти знову, коли {} змінюються інакше"},
     {"mount the triad so that this axis covers the whole range from -1 g to +1 g, and measure again", "установити тріаду так, щоб ця вісь пройшла весь діапазон від −1 g до +1 g, і виміряти знову"},
     // clang-format on
 };

@@ -208,6 +208,64 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
   return {};
 }
 
+/// Functions of another driver, or of another form, in the place of one: the likeliest of each.
+std::vector<Alternative> other_structures(const SearchInput& input, const CandidateList& list,
+                                          const SearchResult& result,
+                                          const EnlargedParameters& base) {
+  const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
+  const double found_gain = without.chi2 - result.fit.chi2;
+  const CandidateGains gains(result.responses, without);
+  const Eigen::VectorXd first_order = gains.of_residual();
+  struct Structure {
+    std::string id;
+    std::size_t candidate = 0;
+    double worth = 0;
+  };
+  std::vector<Structure> likeliest;
+  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
+    const Candidate& candidate = list.candidates[c];
+    if (candidate.has_name() || gains.dof(c) == 0) continue;
+    // The first order may understate what has a shape of its own, but not by this much.
+    const double gain = first_order(static_cast<Eigen::Index>(c));
+    if (gain < 0.5 * found_gain - kIndistinguishable) continue;
+    std::string id = candidate.effect->id();
+    if (std::any_of(result.evidence.begin(), result.evidence.end(), [&](const Evidence& e) {
+          return e.candidate.effect->id() == id && e.candidate.axis == candidate.axis;
+        }))
+      continue;
+    const double worth = gain - kPricePerParameter * gains.dof(c);
+    const auto same = std::find_if(likeliest.begin(), likeliest.end(),
+                                   [&](const Structure& other) { return other.id == id; });
+    if (same == likeliest.end())
+      likeliest.push_back({std::move(id), c, worth});
+    else if (worth > same->worth)
+      *same = {std::move(id), c, worth};
+  }
+  std::sort(likeliest.begin(), likeliest.end(),
+            [](const Structure& a, const Structure& b) { return a.worth > b.worth; });
+  if (likeliest.size() > kRivalsRefined) likeliest.resize(kRivalsRefined);
+  const FitInput fit_input{input.log, result.observed, result.whitening};
+  const Eigen::Index free = result.fit.parameters.free_count();
+  std::vector<std::optional<Alternative>> refined(likeliest.size());
+  parallel_for(refined.size(), [&](std::size_t k) {
+    const std::size_t c = likeliest[k].candidate;
+    EnlargedFit fit = fit_with_candidate(fit_input, gains, c, list.candidates[c],
+                                         first_order(static_cast<Eigen::Index>(c)));
+    if (!fit.determined) return;
+    const auto further =
+        static_cast<double>(std::max<Eigen::Index>(fit.parameters.free_count() - free, 0));
+    if (fit.chi2 + kPricePerParameter * further <= result.fit.chi2 + kIndistinguishable)
+      refined[k] = alternative(likeliest[k].id, std::move(fit), result.fit);
+  });
+  std::vector<Alternative> rivals;
+  for (std::optional<Alternative>& rival : refined)
+    if (rival) rivals.push_back(*std::move(rival));
+  std::stable_sort(rivals.begin(), rivals.end(), [](const Alternative& a, const Alternative& b) {
+    return a.fit.chi2 < b.fit.chi2;
+  });
+  return rivals;
+}
+
 }  // namespace
 
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
@@ -217,6 +275,10 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   if (found.effect->certain(input.log, found.axis))
     return proven_rivals(input, list, result, base, found);
   std::vector<Alternative> rivals = named_rivals(input, list, result, index, base);
+  if (!found.has_name()) {
+    for (Alternative& other : other_structures(input, list, result, base))
+      rivals.push_back(std::move(other));
+  }
   const bool is_there =
       std::any_of(result.evidence.begin(), result.evidence.end(),
                   [](const Evidence& e) { return e.candidate.effect->of_the_room(); });

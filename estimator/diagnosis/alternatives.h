@@ -20,7 +20,8 @@ struct Alternative {
 ///
 /// A rival counts when replacing the effect by it costs less likelihood than noise would
 /// (`kIndistinguishable` in χ², more for every further parameter). Sums are looked for only as long
-/// as a single rival does not do.
+/// as a single rival does not do. What has a name has no rivals without one, which can imitate
+/// anything; what has none has functions of other drivers and of other forms, too.
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
                                            const SearchResult& result, std::size_t index);
 

@@ -284,21 +284,22 @@ std::vector<std::vector<std::size_t>> unlisted_of(const SearchModel& model) {
   return subsets;
 }
 
-/// Candidates with a name, and what they would add.
-struct Named {
+/// Some of the candidates, and what they would add.
+struct Some {
   CandidateList list;
   std::vector<std::size_t> index;  ///< of each in the list that they are from
   CandidateResponses responses;
 };
-Named named_candidates(SearchModel& model) {
-  Named named;
+template <typename Condition>
+Some candidates_that(SearchModel& model, const Condition& meet) {
+  Some some;
   const std::vector<Candidate>& candidates = model.list().candidates;
   for (std::size_t c = 0; c < candidates.size(); ++c)
-    if (candidates[c].has_name()) named.index.push_back(c);
-  for (const std::size_t c : named.index) named.list.candidates.push_back(candidates[c]);
-  named.list.family_size = model.list().family_size;
-  named.responses = some_of(model.responses(), named.index);
-  return named;
+    if (meet(candidates[c])) some.index.push_back(c);
+  for (const std::size_t c : some.index) some.list.candidates.push_back(candidates[c]);
+  some.list.family_size = model.list().family_size;
+  some.responses = some_of(model.responses(), some.index);
+  return some;
 }
 
 /// The likeliest of them beside a fit, if the search as a whole would not often find as much in
@@ -307,25 +308,25 @@ struct Next {
   SearchModel::Entry entry;
   EnlargedFit fit;
 };
-std::optional<Next> likeliest_beside(const SearchModel& model, const Named& named,
+std::optional<Next> likeliest_beside(const SearchModel& model, const Some& some,
                                      const EnlargedFit& fit, std::size_t most, double gain) {
   constexpr std::size_t kMostRefined = 4;
   constexpr double kLater = 2;  // what follows may gain more than what comes first
-  const CandidateGains gains(named.responses, fit);
+  const CandidateGains gains(some.responses, fit);
   std::optional<Next> best;
   double best_score = std::numeric_limits<double>::infinity();
   std::size_t refined = 0;
   const Eigen::VectorXd first_order = gains.of_residual();
   if (static_cast<double>(most) * kLater * first_order.maxCoeff() < gain) return {};
-  for (const Scored& s : screen(named.list, gains, first_order)) {
-    const Candidate& candidate = named.list.candidates[s.candidate];
+  for (const Scored& s : screen(some.list, gains, first_order)) {
+    const Candidate& candidate = some.list.candidates[s.candidate];
     const bool is_there = std::any_of(
         fit.parameters.effects.begin(), fit.parameters.effects.end(), [&](const ActiveEffect& e) {
           return e.effect == candidate.effect && e.axis == candidate.axis;
         });
     if (model.is_certain(candidate) || (is_there && !candidate.effect->repeats())) continue;
     if (refined++ == kMostRefined) break;
-    const std::size_t index = named.index[s.candidate];
+    const std::size_t index = some.index[s.candidate];
     EnlargedFit with = model.fit_with(gains, s.candidate, candidate,
                                       first_order(static_cast<Eigen::Index>(s.candidate)));
     if (!with.determined) continue;
@@ -353,7 +354,7 @@ EnlargedFit with_shapes_released(const SearchModel& model, EnlargedFit fit) {
 
 /// Named candidates in the place of a subset, as many as are cheapest; empty if none are worth
 /// their price.
-std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Named& named,
+std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Some& named,
                                           const std::vector<std::size_t>& subset) {
   const std::size_t most = subset.size() + 2;
   std::vector<SearchModel::Entry> names;
@@ -405,43 +406,29 @@ std::vector<SearchModel::Entry> parts_with_names(const SearchModel& model,
   return parts;
 }
 
-/// Instead of an effect without a name a function of the same driver that has fewer parameters by
-/// two or more, and a candidate with a name; empty if no two are worth their price.
-std::vector<SearchModel::Entry> simpler_with_name(const SearchModel& model,
-                                                  const CandidateResponses& responses,
-                                                  const Named& named, std::size_t effect) {
-  std::vector<SearchModel::Entry> best;
+/// Instead of an effect without a name the likeliest function of the same driver that has fewer
+/// parameters by two or more, and a candidate with a name; empty if they are not worth their price.
+std::vector<SearchModel::Entry> simpler_with_name(SearchModel& model, const Some& named,
+                                                  std::size_t effect) {
   const EnlargedFit without = model.fit_without({effect});
-  if (!without.determined) return best;
-  constexpr std::size_t kMostRefined = 3;
-  std::size_t refined = 0;
+  if (!without.determined) return {};
   const Candidate& replaced = model.candidate(effect);
-  const auto parameters = [](const Candidate& candidate) {
-    return candidate.active().free_count();
-  };
-  double least_cost = model.stage().fit.chi2 + model.price_of({effect}) - kWorthExchanging;
-  const CandidateGains gains(responses, without);
-  const Eigen::VectorXd first_order = gains.of_residual();
-  for (const Scored& s : screen(model.list(), gains, first_order)) {
-    const Candidate& simpler = model.list().candidates[s.candidate];
-    if (simpler.has_name() || simpler.effect->id() != replaced.effect->id() ||
-        simpler.axis != replaced.axis || parameters(simpler) + 1 >= parameters(replaced))
-      continue;
-    if (refined++ == kMostRefined) break;
-    const EnlargedFit fit = model.fit_with(gains, s.candidate, simpler,
-                                           first_order(static_cast<Eigen::Index>(s.candidate)));
-    if (!fit.determined) continue;
-    const double price = model.price_in(fit, s.candidate);
-    std::optional<Next> next =
-        likeliest_beside(model, named, fit, 1, fit.chi2 + price - least_cost);
-    if (!next) continue;
-    const double cost = next->fit.chi2 + price + model.price_in(next->fit, next->entry.candidate);
-    if (cost >= least_cost) continue;
-    least_cost = cost;
-    const double p = model.p_of(simpler, model.log_p_of(s.candidate, without, fit, s.dof));
-    best = {{s.candidate, p, fit.parameters}, std::move(next->entry)};
-  }
-  return best;
+  const Eigen::Index fewer = replaced.active().free_count() - 2;
+  const Some simpler = candidates_that(model, [&](const Candidate& candidate) {
+    return !candidate.has_name() && candidate.effect->id() == replaced.effect->id() &&
+           candidate.axis == replaced.axis && candidate.active().free_count() <= fewer;
+  });
+  if (simpler.index.empty()) return {};
+  std::optional<Next> first = likeliest_beside(model, simpler, without, 1, 0);
+  if (!first) return {};
+  const double least_cost = model.stage().fit.chi2 + model.price_of({effect}) - kWorthExchanging;
+  const double price = model.price_in(first->fit, first->entry.candidate);
+  std::optional<Next> second =
+      likeliest_beside(model, named, first->fit, 1, first->fit.chi2 + price - least_cost);
+  if (!second ||
+      second->fit.chi2 + price + model.price_in(second->fit, second->entry.candidate) >= least_cost)
+    return {};
+  return {std::move(first->entry), std::move(second->entry)};
 }
 
 }  // namespace
@@ -457,7 +444,8 @@ bool name_unlisted(SearchModel& model) {
         exchange_in_own_noise(model, {k}, parts, static_cast<double>(parts.size() - 1)))
       return true;
   }
-  const Named named = named_candidates(model);
+  const Some named =
+      candidates_that(model, [](const Candidate& candidate) { return candidate.has_name(); });
   for (const auto& subset : subsets) {
     const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
     const auto more = static_cast<double>(std::max(names.size(), subset.size()) - subset.size());
@@ -466,7 +454,7 @@ bool name_unlisted(SearchModel& model) {
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& chosen = model.candidate(k);
     if (chosen.has_name() || chosen.effect->subject() != Subject::head) continue;
-    const std::vector<SearchModel::Entry> two = simpler_with_name(model, responses, named, k);
+    const std::vector<SearchModel::Entry> two = simpler_with_name(model, named, k);
     if (!two.empty() && exchange_in_own_noise(model, {k}, two, 1)) return true;
   }
   return false;

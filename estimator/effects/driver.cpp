@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <set>
 
 #include "estimator/kinematics.h"
@@ -97,6 +98,10 @@ std::vector<Driver> of_other_axes(const Driver& own, const std::string& before,
   return drivers;
 }
 
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
 struct Column {
   std::string name;
   std::vector<double> value;
@@ -158,7 +163,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   const auto add = [&](std::string name, const ValueAtVisit& value) -> Driver& {
     return drivers.emplace_back(Driver{std::move(name), "", for_all_axes(log, value)});
   };
-  add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; });
+  add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; }).reference = 0;
   add("delta_deg", [&](std::size_t k) { return visits[k].delta_rad; }).angle = true;
   add("h_deg", [&](std::size_t k) { return visits[k].h_rad; });
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -193,9 +198,13 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   add_way("change of h since",
           [&](std::size_t k) { return visits[k].h_rad - log.before(k)->h_rad; });
   for (const Column& column : recorded_columns(log)) {
-    add(column.name, [&](std::size_t k) { return column.value[k]; }).recorded = true;
+    Driver& of_column = add(column.name, [&](std::size_t k) { return column.value[k]; });
+    of_column.recorded = true;
+    of_column.reference = column.name == kTemperatureColumn ? 0 : mean(column.value);
     const std::vector<double> rate = rate_per_h(log, column.value);
-    add(column.name + ".rate", [&](std::size_t k) { return rate[k]; }).recorded = true;
+    Driver& of_rate = add(column.name + ".rate", [&](std::size_t k) { return rate[k]; });
+    of_rate.recorded = true;
+    of_rate.reference = 0;
   }
   return drivers;
 }

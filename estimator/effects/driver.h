@@ -26,6 +26,9 @@ struct Driver {
   /// The output of this axis. On the axis itself the model's output stands for it: readings that
   /// explain themselves prove nothing.
   std::optional<std::size_t> output_of = {};
+  /// At which U₀ and K are stated, where what a function of it adds to all visits would be theirs:
+  /// the reference temperature, the mean of any other column, the start, a rate of zero.
+  std::optional<double> reference = {};
   double scatter = 0;  ///< of single readings about the value that stands for a dwell
   /// The visit to which the head came from where nothing recorded says; 0 where that is the first.
   std::size_t begins_anew = 0;

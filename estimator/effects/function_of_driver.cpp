@@ -13,7 +13,8 @@ namespace {
 
 /// Legendre polynomials of degree 1 … d over the range that was seen. Where the 12 parameters do
 /// not hold its mean, there is one of degree 0: what is proportional to a temperature or to the
-/// time is so from a zero outside the range.
+/// time is so from a zero outside the range. Where they do, it is nothing at the driver's
+/// reference.
 class Polynomial final : public DrivenTerm {
  public:
   Polynomial(DriverPointer driver, Target target, int degree)
@@ -24,6 +25,7 @@ class Polynomial final : public DrivenTerm {
                                         {"high", variable().unit(), ParameterRole::index}};
     for (int d = first_degree(); d <= degree_; ++d)
       infos.push_back({"p" + std::to_string(d), target().unit(), ParameterRole::amplitude});
+    if (has_reference()) infos.push_back({"ref", variable().unit(), ParameterRole::index});
     return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
@@ -31,6 +33,7 @@ class Polynomial final : public DrivenTerm {
     std::tie(p[0], p[1]) = range();
     if (!(p[1] > p[0]) || !resolves(degree_)) return {};
     if (is_bias_in_disguise(axis)) return {};
+    if (has_reference()) p.back() = *variable().reference;
     if (is_in_the_twelve()) {
       if (degree_ == 1) return {};
       p[2] = 0;
@@ -43,17 +46,23 @@ class Polynomial final : public DrivenTerm {
     return "polynomial of degree " + std::to_string(degree_);
   }
   double at(double value, const double* p) const override {
-    const double constant = first_degree() == 0 ? p[2] : 0;
     // A law of nature goes on; what a run did in its course need not.
     const double curved = variable().is_clock() ? 0 : 1;
-    return constant + legendre_series(value, p[0], p[1], p + 3 - first_degree(), degree_, curved);
+    const double* linear = p + 3 - first_degree();
+    const auto series = [&](double x) {
+      return legendre_series(x, p[0], p[1], linear, degree_, curved);
+    };
+    if (first_degree() == 0) return p[2] + series(value);
+    return has_reference() ? series(value) - series(linear[degree_]) : series(value);
   }
+  bool mean_in_the_twelve() const {
+    return target().form == TermForm::geometry ? target().angle == &HeadGeometry::delta_rad
+                                               : !target().second;
+  }
+  bool has_reference() const { return variable().reference && mean_in_the_twelve(); }
   int first_degree() const {
     const bool clock_or_record = variable().recorded || variable().is_clock();
-    const bool mean_in_the_twelve = target().form == TermForm::geometry
-                                        ? target().angle == &HeadGeometry::delta_rad
-                                        : !target().second;
-    return clock_or_record && !mean_in_the_twelve ? 0 : 1;
+    return clock_or_record && !mean_in_the_twelve() ? 0 : 1;
   }
 
   int degree_;

@@ -61,6 +61,8 @@ class Memory {
 
   const std::string& name() const { return name_; }
   std::string unit() const { return driver_->unit(); }
+  /// At which U₀ and K are stated.
+  double reference() const { return less_average_ ? 0 : driver_->reference.value_or(0); }
   /// Of an attitude, nothing when the head has long been at rest: the 12 parameters are those of
   /// rest then.
   bool vanishes_at_rest() const { return less_average_ && !driver_->recorded; }
@@ -133,7 +135,8 @@ class MemoryTerm final : public SmoothTerm {
             {"t0", "s", ParameterRole::index},
             {"tau", "s", ParameterRole::shape},
             {"start", target_.unit(), ParameterRole::amplitude},
-            {"p1", target_.unit(), ParameterRole::amplitude}};
+            {"p1", target_.unit(), ParameterRole::amplitude},
+            {"ref", memory_->unit(), ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     const double span_s = log.last_s() - log.first_s();
@@ -145,7 +148,7 @@ class MemoryTerm final : public SmoothTerm {
       const auto [low, high] = memory_->range(tau_s);
       if (!(high > low)) continue;  // what never varied drives nothing
       for (const double start : {0.0, size})
-        starts.push_back({{low, high, log.first_s(), tau_s, start, size}});
+        starts.push_back({{low, high, log.first_s(), tau_s, start, size, memory_->reference()}});
     }
     return starts;
   }
@@ -165,11 +168,12 @@ class MemoryTerm final : public SmoothTerm {
 
  private:
   double of_visit(const VisitLog& log, std::size_t axis, std::size_t visit, const double* p) const {
-    if (p[3] > longest_s_) return 0;
-    const double value = memory_->at(p[3], axis, visit);
+    const double t0_s = p[2], tau_s = p[3];
+    if (tau_s > longest_s_) return 0;
     // What was remembered before the first visit, nobody saw.
-    const double start = p[4] * effect::mean_decay(log.visits[visit], p[2], p[3]);
-    return start + legendre_series(value, p[0], p[1], p + 5, 1);
+    const double start = p[4] * effect::mean_decay(log.visits[visit], t0_s, tau_s);
+    const double slope = 2 * p[5] / (p[1] - p[0]);
+    return start + slope * (memory_->at(tau_s, axis, visit) - p[6]);
   }
 
   std::shared_ptr<const Memory> memory_;

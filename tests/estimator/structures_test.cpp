@@ -12,9 +12,11 @@
 namespace plumbline {
 namespace {
 
+using testing::AnyOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::Field;
+using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
@@ -296,6 +298,47 @@ TEST(Structure, ABiasThatJumpsBetweenTwoRingsFollowsTheComponent) {
   const UnlistedStructure found = expect_only_structure(options, {"a_z", "bias", "step"});
   EXPECT_THAT(found.alternatives, Contains("sensor.bias_step"));
   EXPECT_NE(found.separate_by, "");
+}
+
+// A temperature that rises steadily is another clock: which of the two the bias follows, only a run
+// in which it does something else can tell.
+TEST(Structure, WhatFollowsATemperatureThatRisesSteadilyCouldFollowTheTime) {
+  SyntheticOptions options;
+  options.more_V[0] = [](const auto&, double t_s) { return 6e-8 * std::pow(t_s - 150, 2); };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  for (const double t_s : data.run.samples.t_s) data.run.samples.temp_C.push_back(20 + 0.01 * t_s);
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  ASSERT_THAT(found.driver, AnyOf("t_s", "temp_C"));
+  const char* other = found.driver == "t_s" ? "unlisted:temp_C:bias" : "unlisted:t_s:bias";
+  EXPECT_THAT(found.alternatives, Contains(other));
+  EXPECT_THAT(found.separate_by, HasSubstr(other));
+}
+
+// The run was warmer than the reference temperature: they had been those of its mean temperature.
+TEST(Structure, BesideItTheTwelveParametersAreThoseAtTheReferenceTemperature) {
+  const auto above_reference_K = [](double t_s) { return 4 + std::sin(t_s / 20); };
+  SyntheticOptions options;
+  options.more_V[0] = [&](const auto& a_g, double t_s) {
+    return 6e-4 * above_reference_K(t_s) * a_g[1];
+  };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  for (const double t_s : data.run.samples.t_s)
+    data.run.samples.temp_C.push_back(data.description.reference_C + above_reference_K(t_s));
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "temp_C");
+  EXPECT_EQ(result.diagnosis.unlisted.front().form, "scale");
+  const AxisEstimate& x = result.final.batch_ls[0];
+  for (Eigen::Index k = 0; k < 4; ++k)
+    EXPECT_LT(std::abs(x.value(k) - data.truth[0][static_cast<std::size_t>(k)]),
+              4 * std::sqrt(x.covariance(k, k)))
+        << k;
+  EXPECT_LT(std::sqrt(x.covariance(1, 1)), 6e-4);  // a degree's worth
 }
 
 // As a step of the bias in time and another structure beside it.

@@ -197,16 +197,20 @@ std::string describe_truth(const std::vector<sim::EffectSetting>& effects) {
 
 std::string describe_found(const Diagnosis& diagnosis) {
   std::string text;
+  const auto add_alternatives = [&](const Ambiguity& finding) {
+    if (!finding.alternatives.empty())
+      text += fmt::format(" [{}]", fmt::join(finding.alternatives, " | "));
+  };
   for (const FoundEffect& effect : diagnosis.effects) {
     text += fmt::format("{}{}({})", text.empty() ? "" : "; ", effect.id, axes_text(effect.axes));
     for (const EffectParameter& p : effect.parameters)
       text += fmt::format(" {}={:.5g}±{:.2g}", p.name, p.value, p.u);
-    if (!effect.alternatives.empty())
-      text += fmt::format(" [{}]", fmt::join(effect.alternatives, " | "));
+    add_alternatives(effect);
   }
   for (const UnlistedStructure& found : diagnosis.unlisted) {
     text += fmt::format("{}unlisted:{}:{}({}) {}", text.empty() ? "" : "; ", found.driver,
                         found.form, axes_text(found.axes), found.shape);
+    add_alternatives(found);
   }
   return text;
 }
