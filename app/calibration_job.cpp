@@ -58,6 +58,19 @@ Result<void> check_responsive(const Calibration& calibration, const std::string&
   return {};
 }
 
+/// What goes with the time is stated at the start of the run: of a clock that began decades before,
+/// a drift is a bias that nobody knows.
+Result<void> check_clock(const SampleTable& samples, const std::string& source) {
+  constexpr double kMostRuns = 1e4, kShortest_s = 1;
+  if (samples.t_s.empty()) return {};
+  const double start_s = samples.t_s.front();
+  const double run_s = std::max(samples.t_s.back() - start_s, kShortest_s);
+  if (std::abs(start_s) <= kMostRuns * run_s) return {};
+  return fail(ErrorCode::input, fmt::format("{}: t_s begins at {:.0f} s; it counts from the start "
+                                            "of the run, so that is to be taken from it",
+                                            source, start_s));
+}
+
 bool exceeds_limits(const CalibrationOutcome& outcome, const std::optional<Limits>& limits) {
   const DecisionStatus status = outcome.calibration.decision.status;
   if (status == DecisionStatus::fail || status == DecisionStatus::conditional_fail) return true;
@@ -151,6 +164,7 @@ Result<CalibrationJob> job_from_files(const CalibrationFiles& files, std::uint64
   parallel_for(readings.size(), [&](std::size_t k) { readings[k](); });
   if (!run) return fail(run.error());
   if (!record) return fail(record.error());
+  if (auto good = check_clock(run->samples, job.source); !good) return fail(good.error());
   job.run = *std::move(run);
   job.static_record = std::move(record->samples);
   job.run.skipped_rows += record->skipped_rows;

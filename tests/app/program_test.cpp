@@ -286,11 +286,12 @@ void replace_in(const fs::path& file, const std::string& from, const std::string
 }
 
 /// samples.csv with `poses` visits of the angles given by `angles(pose)`.
-std::string samples_at(int poses, const std::function<std::string(int)>& angles) {
+std::string samples_at(int poses, const std::function<std::string(int)>& angles,
+                       double start_s = 0) {
   std::string csv = "t_s,pose,delta_deg,h_deg,ux_V,uy_V,uz_V\n";
   for (int pose = 0; pose < poses; ++pose) {
     for (int i = 0; i < 4; ++i) {
-      csv += fmt::format("{:.2f},{},{},-2.53{},-2.43{},-2.34{}\n", pose + 0.01 * i, pose,
+      csv += fmt::format("{:.2f},{},{},-2.53{},-2.43{},-2.34{}\n", start_s + pose + 0.01 * i, pose,
                          angles(pose), i, (i * 3) % 7, (i * 5) % 9);
     }
   }
@@ -372,6 +373,17 @@ INSTANTIATE_TEST_SUITE_P(
                               }));
                  },
                  "K_z"},
+        BadInput{"ClockOfADate",
+                 [](const TempFolder& f) {
+                   write_text(f / "samples.csv", samples_at(
+                                                     20,
+                                                     [](int pose) {
+                                                       return fmt::format("{},{}", 90 * (pose % 4),
+                                                                          20 * (pose / 4));
+                                                     },
+                                                     1.7e9));
+                 },
+                 "samples.csv: t_s begins at 1700000000 s"},
         BadInput{"DeadAxis",
                  [](const TempFolder& f) {
                    ExampleSet dead;
