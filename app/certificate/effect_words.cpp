@@ -69,12 +69,11 @@ const EffectWords* words_of(const std::string& id) {
   return it == kEffects.end() ? nullptr : it;
 }
 
-std::string structure_name(const std::string& driver, std::string_view form, const Translator& tr) {
-  const std::string subject = form == "bias"       ? tr("the bias")
-                              : form == "scale"    ? tr("the scale factor")
-                              : form == "geometry" ? tr("the geometry of the head")
-                                                   : tr("the readings within a dwell");
-  return tr("not among the listed effects: {} follows {}", subject, driver);
+std::string what_changes(std::string_view form, const Translator& tr) {
+  return form == "bias"       ? tr("the bias")
+         : form == "scale"    ? tr("the scale factor")
+         : form == "geometry" ? tr("the geometry of the head")
+                              : tr("the readings within a dwell");
 }
 
 std::string one_name(const std::string& id, const Translator& tr) {
@@ -82,8 +81,8 @@ std::string one_name(const std::string& id, const Translator& tr) {
   constexpr std::string_view kStructure = "unlisted:";  // unlisted:DRIVER:FORM
   if (const std::size_t form = id.rfind(':');
       id.starts_with(kStructure) && form > kStructure.size())
-    return structure_name(id.substr(kStructure.size(), form - kStructure.size()),
-                          std::string_view(id).substr(form + 1), tr);
+    return tr("{} follows {}", what_changes(std::string_view(id).substr(form + 1), tr),
+              id.substr(kStructure.size(), form - kStructure.size()));
   if (const auto column = covariate_column(id))
     return tr("influence of the recorded column {}", *column);
   return id;
@@ -185,7 +184,8 @@ std::string unlisted_name(const UnlistedStructure& found, const Translator& tr) 
     return tr("not among the listed effects: the bias wanders beyond the static record");
   if (found.is_of_noise())
     return tr("not among the listed effects: the noise follows {}", found.driver);
-  return structure_name(found.driver, found.form, tr);
+  return tr("not among the listed effects: {} follows {}", what_changes(found.form, tr),
+            found.driver);
 }
 
 }  // namespace plumbline::app

@@ -227,6 +227,7 @@ const Catalogue& catalogue() {
     {"the geometry of the head", "геометрія головки"},
     {"the readings within a dwell", "відліки в межах стоянки"},
     {"not among the listed effects: {} follows {}", "поза переліком ефектів: {} залежить від {}"},
+    {"{} follows {}", "{} залежить від {}"},
     {"not among the listed effects: the bias wanders beyond the static record", "поза переліком ефектів: зміщення блукає більше, ніж у записі в спокої"},
     {"not among the listed effects: the noise follows {}", "поза переліком ефектів: шум залежить від {}"},
     {"The twelve parameters describe the unit. Beside them: {}.", "Дванадцять параметрів описують пристрій. Крім того: {}."},

@@ -125,8 +125,9 @@ TEST(EffectWords, EveryEffectHasANameInBothLanguages) {
   EXPECT_EQ(effect_name("rig.h_scale+rig.backlash", en),
             "scale error of the tilt axis + backlash of the spindle");
   EXPECT_EQ(effect_name("covariate:rh_pct", en), "influence of the recorded column rh_pct");
-  EXPECT_EQ(effect_name("unlisted:temp_C.rate:bias", en),
-            "not among the listed effects: the bias follows temp_C.rate");
+  EXPECT_EQ(effect_name("unlisted:temp_C.rate:bias", en), "the bias follows temp_C.rate");
+  EXPECT_EQ(effect_name("unlisted:temp_C.rate:bias", uk), "зміщення нуля залежить від temp_C.rate");
+  EXPECT_THAT(uk.missing(), testing::IsEmpty());
 }
 
 TEST(EffectWords, EveryEffectHasATermInBothLanguages) {
