@@ -14,7 +14,8 @@ namespace {
 /// Legendre polynomials of degree 1 … d over the range that was seen. Where the 12 parameters do
 /// not hold its mean, there is one of degree 0: what is proportional to a temperature or to the
 /// time is so from a zero outside the range. Where they do, it is nothing at the driver's
-/// reference.
+/// reference, and has no slope there where they hold that, too: it is a power series without its
+/// first terms.
 class Polynomial final : public DrivenTerm {
  public:
   Polynomial(DriverPointer driver, Target target, int degree)
@@ -53,7 +54,10 @@ class Polynomial final : public DrivenTerm {
       return legendre_series(x, p[0], p[1], linear, degree_, curved);
     };
     if (first_degree() == 0) return p[2] + series(value);
-    return has_reference() ? series(value) - series(linear[degree_]) : series(value);
+    if (!has_reference()) return series(value);
+    const double reference = linear[degree_], above = series(value) - series(reference);
+    if (!is_in_the_twelve()) return above;
+    return above - legendre_slope(reference, p[0], p[1], linear, degree_) * (value - reference);
   }
   bool mean_in_the_twelve() const {
     return target().form == TermForm::geometry ? target().angle == &HeadGeometry::delta_rad
@@ -326,6 +330,17 @@ double legendre_series(double value, double low, double high, const double* c, i
   if (position == x || degree > kContinued) return sum;
   const double end_slope = c[0] + (degree == 2 ? 3 * x * c[1] : 0);
   return sum + end_slope * (position - x);
+}
+
+double legendre_slope(double value, double low, double high, const double* c, int degree) {
+  const double x = (2 * value - low - high) / (high - low);
+  double before = 1, now = x, slope_before = 0, slope = 1, sum = c[0];
+  for (int d = 2; d <= degree; ++d) {
+    slope_before = std::exchange(slope, slope_before + (2 * d - 1) * now);
+    before = std::exchange(now, ((2 * d - 1) * x * now - (d - 1) * before) / d);
+    sum += c[d - 1] * slope;
+  }
+  return 2 * sum / (high - low);
 }
 
 std::unique_ptr<SmoothTerm> polynomial(DriverPointer driver, const Target& target, int degree) {

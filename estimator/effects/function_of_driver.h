@@ -38,6 +38,9 @@ struct Target {
 double legendre_series(double value, double low, double high, const double* c, int degree,
                        double curved = 0);
 
+/// Its slope at a value within the range: P′_d = P′_{d−2} + (2d − 1)·P_{d−1}.
+double legendre_slope(double value, double low, double high, const double* c, int degree);
+
 /// Numbers of cycles in the range of a driver: least, least + step … most.
 struct Cycles {
   double least, step, most;

@@ -69,20 +69,6 @@ TEST(Findings, SingleReadingsOfAnUndeclaredConverterProveNoStep) {
   EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
 }
 
-TEST(Findings, AnUnlistedFunctionOfTheOwnAxisLeavesItsSensitivityAlone) {
-  SyntheticOptions options;
-  options.more_V[0] = [](const auto& a_g, double) {
-    return 5e-4 * std::legendre(5, a_g[0] / 1.001);
-  };
-  const SyntheticRun data = synthetic_run(4, kSixteenBits, options);
-  const Calibration result = calibrated(data);
-  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U) << result.diagnosis.reason;
-  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "a_x");
-  const AxisEstimate& x = result.final.batch_ls[0];
-  EXPECT_NEAR(x.value(0), data.truth[0][0], 0.01 * data.truth[0][0]);
-  EXPECT_LT(std::sqrt(x.covariance(0, 0)), 0.005 * data.truth[0][0]);
-}
-
 SyntheticOptions something_happened_to_x() {
   SyntheticOptions options;
   options.more_V[0] = [](const auto&, double t_s) {

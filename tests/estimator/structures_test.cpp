@@ -341,6 +341,27 @@ TEST(Structure, BesideItTheTwelveParametersAreThoseAtTheReferenceTemperature) {
   EXPECT_LT(std::sqrt(x.covariance(1, 1)), 6e-4);  // a degree's worth
 }
 
+// Of a power series the twelve parameters hold the first two terms, whatever polynomial fits it.
+TEST(Structure, BesideAFourthAndFifthOrderTheTwelveParametersAreThoseAtZero) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_V[1] = [](const auto& a_g, double) {
+    return 2e-3 * std::pow(a_g[1], 4) + 1e-3 * std::pow(a_g[1], 5);
+  };
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "a_y");
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  const AxisEstimate& y = result.final.batch_ls[1];
+  for (Eigen::Index k = 0; k < 4; ++k)
+    EXPECT_LT(std::abs(y.value(k) - data.truth[1][static_cast<std::size_t>(k)]),
+              4 * std::sqrt(y.covariance(k, k)))
+        << k;
+  EXPECT_LT(std::sqrt(y.covariance(1, 1)), 0.01 * data.truth[1][1]);  // it is known all the same
+}
+
 // As a step of the bias in time and another structure beside it.
 TEST(Structure, ABellOverTwoRingsIsOne) {
   SyntheticOptions options;
