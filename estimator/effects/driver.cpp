@@ -98,18 +98,6 @@ std::vector<Driver> of_other_axes(const Driver& own, const std::string& before,
   return drivers;
 }
 
-/// A zero well within the range is a reference: there a polynomial and its slope are known.
-std::optional<double> zero_within(const PerAxis<std::vector<double>>& values) {
-  constexpr double kEnd = 0.05;  // of the range
-  for (const std::vector<double>& of_axis : values) {
-    const auto [low, high] = std::minmax_element(of_axis.begin(), of_axis.end());
-    if (low == of_axis.end()) return {};
-    const double end = kEnd * (*high - *low);
-    if (*low + end > 0 || *high - end < 0) return {};
-  }
-  return 0;
-}
-
 double mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
@@ -183,11 +171,11 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
     drivers.push_back({std::string("a_") + kAxisName[i], "", {a_g, a_g, a_g}});
     drivers.back().in_the_twelve = true;
     drivers.back().component = i;
-    drivers.back().reference = zero_within(drivers.back().value);
+    drivers.back().reference = 0;
   }
   drivers.push_back({"previous_pose", "change of a_i since", changes_g(log)});
   drivers.back().span = about_zero(drivers.back().value);
-  drivers.back().reference = zero_within(drivers.back().value);
+  drivers.back().reference = 0;
   // What only a direction decides is the simpler where an order of visits tells no more.
   for (const std::size_t way : {std::size_t{0}, std::size_t{1}}) {
     Driver& direction = add("previous_pose", [&, way](std::size_t k) {
@@ -207,7 +195,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
                       [&](std::size_t k) { return log.before(k) == nullptr ? 0.0 : value(k); });
     way.past = std::move(past);
     way.span = about_zero(way.value);
-    way.reference = zero_within(way.value);
+    way.reference = 0;
   };
   add_way("turn of delta since", [&](std::size_t k) { return turn_rad(log, k); });
   add_way("change of h since",
@@ -227,7 +215,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
 std::vector<Driver> changes_of_others(const VisitLog& log) {
   Driver own{"previous_pose", "", changes_g(log)};
   own.span = about_zero(own.value);
-  own.reference = zero_within(own.value);
+  own.reference = 0;
   return of_other_axes(own, "change of the ", " since");
 }
 

@@ -28,7 +28,7 @@ struct Driver {
   std::optional<std::size_t> output_of = {};
   /// At which U₀ and K are stated, where what a function of it adds to all visits would be theirs:
   /// the reference temperature, the mean of any other column, the start, a rate, a change or a
-  /// component of zero. None where the visits came to that with an end of the range only.
+  /// component of zero. A matter of the driver, not of the visits: a model is read back for others.
   std::optional<double> reference = {};
   double scatter = 0;  ///< of single readings about the value that stands for a dwell
   /// The visit to which the head came from where nothing recorded says; 0 where that is the first.

@@ -14,8 +14,8 @@ namespace {
 /// Legendre polynomials of degree 1 … d over the range that was seen. Where the 12 parameters do
 /// not hold its mean, there is one of degree 0: what is proportional to a temperature or to the
 /// time is so from a zero outside the range. Where they do, it is nothing at the driver's
-/// reference, and has no slope there where they hold that, too: it is a power series without its
-/// first terms.
+/// reference, and has no slope there (or at the end of the range next to it) where they hold that,
+/// too: it is a power series without its first terms.
 class Polynomial final : public DrivenTerm {
  public:
   Polynomial(DriverPointer driver, Target target, int degree)
@@ -55,9 +55,11 @@ class Polynomial final : public DrivenTerm {
     };
     if (first_degree() == 0) return p[2] + series(value);
     if (!has_reference()) return series(value);
-    const double reference = linear[degree_], above = series(value) - series(reference);
-    if (!is_in_the_twelve()) return above;
-    return above - legendre_slope(reference, p[0], p[1], linear, degree_) * (value - reference);
+    const double reference = linear[degree_];
+    if (!is_in_the_twelve()) return series(value) - series(reference);
+    const double touched = std::clamp(reference, p[0], p[1]);
+    const double slope = legendre_slope(touched, p[0], p[1], linear, degree_);
+    return series(value) - series(touched) - slope * (value - touched);
   }
   bool mean_in_the_twelve() const {
     return target().form == TermForm::geometry ? target().angle == &HeadGeometry::delta_rad

@@ -86,6 +86,27 @@ TEST(AverageOfThePast, OfTheAttitudeIsNothingAfterALongRest) {
   EXPECT_EQ(seen, 2);  // bias and scale
 }
 
+// A model is read again for whatever visits there are.
+TEST(SmoothTerms, HaveTheSameParametersWhateverWasVisited) {
+  const VisitLog log = example_log(), few = example_log(57);
+  const auto terms = smooth_terms(log, SmoothTermSelection::any);
+  const auto others = smooth_terms(few, SmoothTermSelection::any);
+  const auto names = [](const SmoothTerm& term) {
+    std::vector<std::string> all;
+    for (const ParameterInfo& info : term.parameters()) all.push_back(info.name);
+    return all;
+  };
+  int seen = 0;
+  for (const auto& term : terms) {
+    const SmoothTerm* other =
+        find_term(others, term->driver(), to_string(term->form()), term->shape());
+    ASSERT_NE(other, nullptr) << term->driver() << ' ' << term->shape();
+    EXPECT_EQ(names(*term), names(*other)) << term->driver() << ' ' << term->shape();
+    ++seen;
+  }
+  EXPECT_GT(seen, 300);
+}
+
 // A model that is read again takes the first term of that driver, form and shape.
 TEST(SmoothTerms, OfOneDriverFormAndShapeSayTheSame) {
   const VisitLog log = example_log();
