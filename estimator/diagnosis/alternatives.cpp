@@ -119,66 +119,97 @@ std::optional<Alternative> field_of_room(const SearchInput& input, const Candida
   return {};
 }
 
-/// Named candidates, alone or, where none does alone, in sums.
-std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateList& list,
-                                      const SearchResult& result, std::size_t index,
-                                      const EnlargedParameters& base) {
-  const Candidate& found = result.evidence[index].candidate;
-  const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
-  const double found_gain = without.chi2 - result.fit.chi2;
-  const auto found_free =
-      static_cast<double>(result.fit.parameters.free_count() - base.free_count());
+/// What the model leaves without the effect that was found, and what each candidate would explain
+/// of it.
+struct Vacancy {
+  /// `base`: the model without it.
+  Vacancy(const SearchInput& input, const CandidateList& from, const SearchResult& search,
+          const Candidate& what_left, const EnlargedParameters& base)
+      : list(from),
+        result(search),
+        found(what_left),
+        fit_input{input.log, search.observed, search.whitening},
+        without(fit_enlarged(input.log, search.observed, search.whitening, base)),
+        found_gain(without.chi2 - search.fit.chi2),
+        gains(search.responses, without),
+        ranked(best_of_families(list, gains, gains.of_residual())) {}
+  Vacancy(const Vacancy&) = delete;  // the gains refer to the fit beside them
+  Vacancy& operator=(const Vacancy&) = delete;
 
+  /// How much a rival with so many free parameters must explain.
+  double needed(Eigen::Index free) const {
+    const auto further = static_cast<double>(free - result.fit.parameters.free_count());
+    return found_gain - kIndistinguishable + kPricePerParameter * further;
+  }
+  /// The first order may understate a nonlinear rival, but not by this much.
+  bool may_do(const Rival& rival) const {
+    return rival.gain >= 0.5 * found_gain - kIndistinguishable;
+  }
+
+  const CandidateList& list;
+  const SearchResult& result;
+  const Candidate& found;
+  FitInput fit_input;
+  EnlargedFit without;
+  double found_gain;
+  // Responses at the final model: they hardly depend on the parameters.
+  CandidateGains gains;
+  std::vector<Rival> ranked;
+};
+
+/// Those that do as well as what was found, one of each name, most likely first.
+std::vector<Alternative> that_do_as_well(const Vacancy& vacancy, const std::vector<Rival>& rivals) {
+  std::vector<EnlargedFit> fits(rivals.size());
+  parallel_for(fits.size(), [&](std::size_t k) {
+    const auto& [candidate, gain] = rivals[k];
+    fits[k] = fit_with_candidate(vacancy.fit_input, vacancy.gains, candidate,
+                                 vacancy.list.candidates[candidate], gain);
+  });
+  std::vector<Alternative> alternatives;
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    if (!fits[k].determined) continue;
+    const Eigen::Index free =
+        std::max(fits[k].parameters.free_count(), vacancy.result.fit.parameters.free_count());
+    if (vacancy.without.chi2 - fits[k].chi2 < vacancy.needed(free)) continue;
+    const std::string id = vacancy.list.candidates[rivals[k].candidate].effect->id();
+    if (id != vacancy.found.effect->id() &&
+        std::none_of(alternatives.begin(), alternatives.end(),
+                     [&](const Alternative& other) { return other.name == id; }))
+      alternatives.push_back(alternative(id, std::move(fits[k]), vacancy.result.fit));
+  }
+  std::stable_sort(
+      alternatives.begin(), alternatives.end(),
+      [](const Alternative& a, const Alternative& b) { return a.fit.chi2 < b.fit.chi2; });
+  return alternatives;
+}
+
+/// Named candidates, alone or, where none does alone, in sums.
+std::vector<Alternative> named_rivals(const Vacancy& vacancy) {
+  const CandidateList& list = vacancy.list;
+  const SearchResult& result = vacancy.result;
   const auto usable = [&](const Candidate& candidate) {
     // A smooth term can imitate anything; it is no rival that could be looked for.
-    if (!candidate.has_name() || same_effect(candidate, found)) return false;
+    if (!candidate.has_name() || same_effect(candidate, vacancy.found)) return false;
     return std::none_of(result.evidence.begin(), result.evidence.end(),
                         [&](const Evidence& e) { return same_effect(e.candidate, candidate); });
   };
-  const auto needed = [&](double free) {
-    return found_gain - kIndistinguishable + kPricePerParameter * (free - found_free);
-  };
 
-  std::vector<Alternative> singles;
-  // Responses at the final model: they hardly depend on the parameters.
-  const FitInput fit_input{input.log, result.observed, result.whitening};
-  const CandidateGains gains_of(result.responses, without);
-  const auto ranked = best_of_families(list, gains_of, gains_of.of_residual());
-  std::vector<Rival> refined;
-  for (const Rival& rival : ranked) {
-    // The first order may understate a nonlinear rival, but not by this much.
-    if (refined.size() == kRivalsRefined || rival.gain < 0.5 * found_gain - kIndistinguishable)
-      break;
-    if (usable(list.candidates[rival.candidate])) refined.push_back(rival);
+  std::vector<Rival> alone;
+  for (const Rival& rival : vacancy.ranked) {
+    if (alone.size() == kRivalsRefined || !vacancy.may_do(rival)) break;
+    if (usable(list.candidates[rival.candidate])) alone.push_back(rival);
   }
-  std::vector<EnlargedFit> fits(refined.size());
-  parallel_for(fits.size(), [&](std::size_t k) {
-    const auto& [candidate, gain] = refined[k];
-    fits[k] = fit_with_candidate(fit_input, gains_of, candidate, list.candidates[candidate], gain);
-  });
-  for (std::size_t k = 0; k < fits.size(); ++k) {
-    if (!fits[k].determined) continue;
-    const auto free = static_cast<double>(fits[k].parameters.free_count() - base.free_count());
-    if (without.chi2 - fits[k].chi2 < needed(std::max(free, found_free))) continue;
-    const std::string id = list.candidates[refined[k].candidate].effect->id();
-    if (id != found.effect->id() &&
-        std::none_of(singles.begin(), singles.end(),
-                     [&](const Alternative& s) { return s.name == id; }))
-      singles.push_back(alternative(id, std::move(fits[k]), result.fit));
-  }
-  std::stable_sort(singles.begin(), singles.end(), [](const Alternative& a, const Alternative& b) {
-    return a.fit.chi2 < b.fit.chi2;
-  });
+  std::vector<Alternative> singles = that_do_as_well(vacancy, alone);
   if (!singles.empty()) return singles;
 
   // A sum: always the rival that helps most, until it explains as much.
   std::vector<Candidate> sum;
-  EnlargedFit fit = without;
+  EnlargedFit fit = vacancy.without;
   while (sum.size() < kLongestSum) {
     // A sum whose first members leave most of it open is not worth the search.
-    if (!sum.empty() && without.chi2 - fit.chi2 < 0.8 * found_gain) break;
+    if (!sum.empty() && vacancy.without.chi2 - fit.chi2 < 0.8 * vacancy.found_gain) break;
     std::optional<CandidateGains> beside;
-    std::vector<Rival> order = ranked;
+    std::vector<Rival> order = vacancy.ranked;
     if (!sum.empty()) {
       beside.emplace(result.responses, fit);
       order = best_of_families(list, *beside, beside->of_residual());
@@ -191,11 +222,12 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
     });
     if (best == order.end()) break;
     sum.push_back(list.candidates[best->candidate]);
-    fit = fit_with_candidate(fit_input, beside ? *beside : gains_of, best->candidate, sum.back(),
-                             best->gain);
+    fit = fit_with_candidate(vacancy.fit_input, beside ? *beside : vacancy.gains, best->candidate,
+                             sum.back(), best->gain);
     if (!fit.determined) break;
-    const auto free = static_cast<double>(fit.parameters.free_count() - base.free_count());
-    if (sum.size() < 2 || without.chi2 - fit.chi2 < needed(free)) continue;
+    if (sum.size() < 2 ||
+        vacancy.without.chi2 - fit.chi2 < vacancy.needed(fit.parameters.free_count()))
+      continue;
     std::vector<std::string> ids;
     ids.reserve(sum.size());
     for (const Candidate& member : sum) ids.push_back(member.effect->id());
@@ -208,62 +240,37 @@ std::vector<Alternative> named_rivals(const SearchInput& input, const CandidateL
   return {};
 }
 
-/// Functions of another driver, or of another form, in the place of one: the likeliest of each.
-std::vector<Alternative> other_structures(const SearchInput& input, const CandidateList& list,
-                                          const SearchResult& result,
-                                          const EnlargedParameters& base) {
-  const EnlargedFit without = fit_enlarged(input.log, result.observed, result.whitening, base);
-  const double found_gain = without.chi2 - result.fit.chi2;
-  const CandidateGains gains(result.responses, without);
-  const Eigen::VectorXd first_order = gains.of_residual();
-  struct Structure {
-    std::string id;
-    std::size_t candidate = 0;
-    double worth = 0;
+/// Functions of another driver, or of another form: the likeliest of each.
+std::vector<Alternative> other_structures(const Vacancy& vacancy) {
+  const auto candidate_of = [&](const Rival& rival) -> const Candidate& {
+    return vacancy.list.candidates[rival.candidate];
   };
-  std::vector<Structure> likeliest;
-  for (std::size_t c = 0; c < list.candidates.size(); ++c) {
-    const Candidate& candidate = list.candidates[c];
-    if (candidate.has_name() || gains.dof(c) == 0) continue;
-    // The first order may understate what has a shape of its own, but not by this much.
-    const double gain = first_order(static_cast<Eigen::Index>(c));
-    if (gain < 0.5 * found_gain - kIndistinguishable) continue;
-    std::string id = candidate.effect->id();
-    if (std::any_of(result.evidence.begin(), result.evidence.end(), [&](const Evidence& e) {
-          return e.candidate.effect->id() == id && e.candidate.axis == candidate.axis;
-        }))
-      continue;
-    const double worth = gain - kPricePerParameter * gains.dof(c);
-    const auto same = std::find_if(likeliest.begin(), likeliest.end(),
-                                   [&](const Structure& other) { return other.id == id; });
+  const auto worth = [&](const Rival& rival) {
+    return rival.gain - kPricePerParameter * vacancy.gains.dof(rival.candidate);
+  };
+  const auto is_there = [&](const Candidate& candidate) {
+    return std::any_of(vacancy.result.evidence.begin(), vacancy.result.evidence.end(),
+                       [&](const Evidence& e) {
+                         return e.candidate.effect->id() == candidate.effect->id() &&
+                                e.candidate.axis == candidate.axis;
+                       });
+  };
+  std::vector<Rival> likeliest;
+  for (const Rival& rival : vacancy.ranked) {
+    const Candidate& candidate = candidate_of(rival);
+    if (candidate.has_name() || !vacancy.may_do(rival) || is_there(candidate)) continue;
+    const auto same = std::find_if(likeliest.begin(), likeliest.end(), [&](const Rival& other) {
+      return candidate_of(other).effect->id() == candidate.effect->id();
+    });
     if (same == likeliest.end())
-      likeliest.push_back({std::move(id), c, worth});
-    else if (worth > same->worth)
-      *same = {std::move(id), c, worth};
+      likeliest.push_back(rival);
+    else if (worth(rival) > worth(*same))
+      *same = rival;
   }
   std::sort(likeliest.begin(), likeliest.end(),
-            [](const Structure& a, const Structure& b) { return a.worth > b.worth; });
+            [&](const Rival& a, const Rival& b) { return worth(a) > worth(b); });
   if (likeliest.size() > kRivalsRefined) likeliest.resize(kRivalsRefined);
-  const FitInput fit_input{input.log, result.observed, result.whitening};
-  const Eigen::Index free = result.fit.parameters.free_count();
-  std::vector<std::optional<Alternative>> refined(likeliest.size());
-  parallel_for(refined.size(), [&](std::size_t k) {
-    const std::size_t c = likeliest[k].candidate;
-    EnlargedFit fit = fit_with_candidate(fit_input, gains, c, list.candidates[c],
-                                         first_order(static_cast<Eigen::Index>(c)));
-    if (!fit.determined) return;
-    const auto further =
-        static_cast<double>(std::max<Eigen::Index>(fit.parameters.free_count() - free, 0));
-    if (fit.chi2 + kPricePerParameter * further <= result.fit.chi2 + kIndistinguishable)
-      refined[k] = alternative(likeliest[k].id, std::move(fit), result.fit);
-  });
-  std::vector<Alternative> rivals;
-  for (std::optional<Alternative>& rival : refined)
-    if (rival) rivals.push_back(*std::move(rival));
-  std::stable_sort(rivals.begin(), rivals.end(), [](const Alternative& a, const Alternative& b) {
-    return a.fit.chi2 < b.fit.chi2;
-  });
-  return rivals;
+  return that_do_as_well(vacancy, likeliest);
 }
 
 }  // namespace
@@ -274,10 +281,10 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
   const EnlargedParameters base = without_effect(result.fit.parameters, index);
   if (found.effect->certain(input.log, found.axis))
     return proven_rivals(input, list, result, base, found);
-  std::vector<Alternative> rivals = named_rivals(input, list, result, index, base);
+  const Vacancy vacancy(input, list, result, found, base);
+  std::vector<Alternative> rivals = named_rivals(vacancy);
   if (!found.has_name()) {
-    for (Alternative& other : other_structures(input, list, result, base))
-      rivals.push_back(std::move(other));
+    for (Alternative& other : other_structures(vacancy)) rivals.push_back(std::move(other));
   }
   const bool is_there =
       std::any_of(result.evidence.begin(), result.evidence.end(),

@@ -8,8 +8,6 @@
 #include <utility>
 
 #include "estimator/diagnosis/separating_design.h"
-#include "estimator/effects/driver.h"
-#include "estimator/effects/smooth_term.h"
 
 namespace plumbline {
 namespace {
@@ -37,15 +35,10 @@ std::string joined(const std::vector<std::string>& parts, const char* between) {
 }
 
 /// Recorded columns that any of them follows.
-std::set<std::string> columns_of(const VisitLog& log, const ActiveEffect& found,
-                                 std::span<const ActiveEffect> others) {
+std::set<std::string> columns_of(const ActiveEffect& found, std::span<const ActiveEffect> others) {
   std::set<std::string> columns;
   const auto add = [&](const ActiveEffect& active) {
-    const auto* term = dynamic_cast<const SmoothTerm*>(active.effect);
-    const std::vector<std::string> followed =
-        term == nullptr ? active.effect->columns()
-                        : std::vector<std::string>{recorded_column(term->driver())};
-    if (log.lacking(followed).empty()) columns.insert(followed.begin(), followed.end());
+    for (std::string& column : active.effect->columns()) columns.insert(std::move(column));
   };
   add(found);
   for (const ActiveEffect& other : others) add(other);
@@ -54,8 +47,7 @@ std::set<std::string> columns_of(const VisitLog& log, const ActiveEffect& found,
 
 /// The remedy where no pose of this head and mounting decides: what turns along with what, or what
 /// else was recorded.
-std::string by_other_means(const VisitLog& log, const ActiveEffect& found,
-                           std::span<const ActiveEffect> others) {
+std::string by_other_means(const ActiveEffect& found, std::span<const ActiveEffect> others) {
   bool other_field = false, other_head = false, other_sensor = false;
   for (const ActiveEffect& other : others) {
     other_field |= other.effect->of_the_room();
@@ -71,7 +63,7 @@ std::string by_other_means(const VisitLog& log, const ActiveEffect& found,
            "what belongs to the sensor turns along, what belongs to the head does not";
   if (field || other_field)
     return "turn the base by 180° in azimuth and measure again: a field of the room stays";
-  if (const std::set<std::string> columns = columns_of(log, found, others); !columns.empty())
+  if (const std::set<std::string> columns = columns_of(found, others); !columns.empty())
     return "measure again while " +
            joined(std::vector<std::string>(columns.begin(), columns.end()), ", ") +
            (columns.size() == 1 ? " takes another course" : " take other courses");
@@ -111,7 +103,7 @@ Separation separate(const SearchInput& input, const SearchResult& result, std::s
   };
   const auto undecided = [&](const Alternative& rival, const std::string& how_far) {
     return "no poses of this head tell it from " + rival.name + how_far + ": " +
-           by_other_means(input.log, found, others_of(rival));
+           by_other_means(found, others_of(rival));
   };
   std::vector<Alternative> rivals;
   std::vector<std::string> clauses;

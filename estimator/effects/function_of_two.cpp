@@ -69,6 +69,9 @@ class LineTimesLine final : public DrivenTerm {
             {"p01", target().unit(), ParameterRole::amplitude},
             {"p11", target().unit(), ParameterRole::amplitude}};
   }
+  std::vector<std::string> columns() const override {
+    return {recorded_column(variable().name), recorded_column(other_->name)};
+  }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     const auto [other_low, other_high] =

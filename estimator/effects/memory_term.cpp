@@ -61,6 +61,10 @@ class Memory {
 
   const std::string& name() const { return name_; }
   std::string unit() const { return driver_->unit(); }
+  std::vector<std::string> columns() const {
+    if (!driver_->recorded) return {};
+    return {recorded_column(driver_->name)};
+  }
   /// At which U₀ and K are stated.
   double reference() const { return less_average_ ? 0 : driver_->reference.value_or(0); }
   /// Of an attitude, nothing when the head has long been at rest: the 12 parameters are those of
@@ -129,6 +133,7 @@ class MemoryTerm final : public SmoothTerm {
   }
   Subject subject() const override { return Subject::sensor; }
   bool remembers() const override { return true; }
+  std::vector<std::string> columns() const override { return memory_->columns(); }
   std::vector<ParameterInfo> parameters() const override {
     return {{"low", memory_->unit(), ParameterRole::index},
             {"high", memory_->unit(), ParameterRole::index},

@@ -318,50 +318,6 @@ TEST(Structure, WhatFollowsATemperatureThatRisesSteadilyCouldFollowTheTime) {
   EXPECT_THAT(found.separate_by, HasSubstr(other));
 }
 
-// The run was warmer than the reference temperature: they had been those of its mean temperature.
-TEST(Structure, BesideItTheTwelveParametersAreThoseAtTheReferenceTemperature) {
-  const auto above_reference_K = [](double t_s) { return 4 + std::sin(t_s / 20); };
-  SyntheticOptions options;
-  options.more_V[0] = [&](const auto& a_g, double t_s) {
-    return 6e-4 * above_reference_K(t_s) * a_g[1];
-  };
-  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  for (const double t_s : data.run.samples.t_s)
-    data.run.samples.temp_C.push_back(data.description.reference_C + above_reference_K(t_s));
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "temp_C");
-  EXPECT_EQ(result.diagnosis.unlisted.front().form, "scale");
-  const AxisEstimate& x = result.final.batch_ls[0];
-  for (Eigen::Index k = 0; k < 4; ++k)
-    EXPECT_LT(std::abs(x.value(k) - data.truth[0][static_cast<std::size_t>(k)]),
-              4 * std::sqrt(x.covariance(k, k)))
-        << k;
-  EXPECT_LT(std::sqrt(x.covariance(1, 1)), 6e-4);  // a degree's worth
-}
-
-// Of a power series the twelve parameters hold the first two terms, whatever polynomial fits it.
-TEST(Structure, BesideAFourthAndFifthOrderTheTwelveParametersAreThoseAtZero) {
-  SyntheticOptions options;
-  options.delta_step_deg = 10;
-  options.more_V[1] = [](const auto& a_g, double) {
-    return 2e-3 * std::pow(a_g[1], 4) + 1e-3 * std::pow(a_g[1], 5);
-  };
-  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "a_y");
-  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  const AxisEstimate& y = result.final.batch_ls[1];
-  for (Eigen::Index k = 0; k < 4; ++k)
-    EXPECT_LT(std::abs(y.value(k) - data.truth[1][static_cast<std::size_t>(k)]),
-              4 * std::sqrt(y.covariance(k, k)))
-        << k;
-  EXPECT_LT(std::sqrt(y.covariance(1, 1)), 0.01 * data.truth[1][1]);  // it is known all the same
-}
-
 // As a step of the bias in time and another structure beside it.
 TEST(Structure, ABellOverTwoRingsIsOne) {
   SyntheticOptions options;
