@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/validated_search.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -149,27 +150,18 @@ std::optional<std::size_t> what_worsens(const SearchInput& search,
   return {};
 }
 
-/// Searches; without what makes poses that are left out worse, again.
-void search_past_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
-                              const PerAxis<double>& before_mps2, const SearchOptions& options,
-                              ValidatedSearch& result) {
-  constexpr int kMostSearches = 3;
-  SearchResult& found = result.found;
-  std::optional<std::size_t> worst;
-  for (int k = 0; k < kMostSearches; ++k) {
-    if (worst)
-      std::erase_if(result.candidates.candidates,
-                    [family = found.evidence[*worst].candidate.family](const Candidate& candidate) {
-                      return candidate.family == family;
-                    });
-    found = search_effects(search, result.candidates, options);
-    worst = what_worsens(search, poses, found, before_mps2);
-    if (!worst) return;
-  }
-  for (; worst; worst = what_worsens(search, poses, found, before_mps2)) {
+void drop_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
+                       const PerAxis<double>& before_mps2, SearchResult& found) {
+  while (const auto worst = what_worsens(search, poses, found, before_mps2)) {
     found.remove(*worst);
     found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
   }
+}
+
+/// Of all candidates beside a model that has become smaller: what failed stays one for those who
+/// ask what else the readings allow.
+void renew_responses(const SearchInput& search, ValidatedSearch& result) {
+  SearchResult& found = result.found;
   found.responses =
       candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
 }
@@ -177,25 +169,56 @@ void search_past_what_worsens(const SearchInput& search, const std::vector<PoseM
 /// Leaves what carries over to poses that were left out.
 void keep_what_carries(const SearchInput& search, const std::vector<PoseMean>& poses,
                        ValidatedSearch& result) {
+  result.gains.clear();
+  result.heldout_mps2 = {};
   SearchResult& found = result.found;
+  if (found.evidence.empty()) return;
   const Validation validation(search.log, poses, found);
-  std::vector<std::size_t> dropped;
   if (result.codes) {
     // Edges of the bits hide what carries over.
     SearchResult& without = result.codes->before_converter;
-    dropped = drop_what_does_not_carry(*result.log, Validation(*result.log, poses, without),
-                                       without, result.gains);
+    const std::vector<std::size_t> dropped = drop_what_does_not_carry(
+        *result.log, Validation(*result.log, poses, without), without, result.gains);
     drop_effects(search, dropped, found, *result.codes);
+    if (!dropped.empty()) renew_responses(search, result);
     const std::vector<LeftOut> with = validation.leave_out(found.fit);
     for (std::size_t k = result.gains.size(); k < found.evidence.size(); ++k)
       result.gains.push_back(std::max(0.0, validation.without(k, with).gain));
   } else {
-    dropped = drop_what_does_not_carry(search.log, validation, found, result.gains);
+    drop_what_does_not_carry(search.log, validation, found, result.gains);
   }
-  if (!dropped.empty())
-    found.responses =
-        candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
   if (!found.evidence.empty()) result.heldout_mps2 = validation.errors_mps2(found.fit);
+}
+
+std::vector<std::size_t> families_of(const SearchResult& found) {
+  std::vector<std::size_t> families;
+  for (const Evidence& evidence : found.evidence) families.push_back(evidence.candidate.family);
+  std::sort(families.begin(), families.end());
+  return families;
+}
+
+/// Searches; again without what makes poses that are left out worse or does not carry over to them:
+/// it may have stood in the way of what does.
+void search_past_what_fails(const SearchInput& search, const std::vector<PoseMean>& poses,
+                            const PerAxis<double>& before_mps2, const SearchOptions& options,
+                            ValidatedSearch& result) {
+  constexpr int kMostSearches = 3;
+  CandidateList open = result.candidates;
+  for (int k = 0; k < kMostSearches; ++k) {
+    result.found = search_effects(search, open, options);
+    const std::vector<std::size_t> families = families_of(result.found);
+    drop_what_worsens(search, poses, before_mps2, result.found);
+    keep_what_carries(search, poses, result);
+    std::vector<std::size_t> failed;
+    const std::vector<std::size_t> kept = families_of(result.found);
+    std::set_difference(families.begin(), families.end(), kept.begin(), kept.end(),
+                        std::back_inserter(failed));
+    if (failed.empty()) break;
+    std::erase_if(open.candidates, [&](const Candidate& candidate) {
+      return std::binary_search(failed.begin(), failed.end(), candidate.family);
+    });
+  }
+  if (open.candidates.size() < result.candidates.candidates.size()) renew_responses(search, result);
 }
 
 }  // namespace
@@ -212,11 +235,11 @@ ValidatedSearch search_validated(const SearchInput& search, const CalibrationInp
     result.candidates = std::move(beside_bits->candidates);
     result.found = std::move(beside_bits->found);
     result.codes = std::move(beside_bits->given_back);
+    keep_what_carries(search, poses, result);
   } else {
     result.candidates = all_candidates(search.log, own);
-    search_past_what_worsens(search, poses, before_mps2, options, result);
+    search_past_what_fails(search, poses, before_mps2, options, result);
   }
-  if (!result.found.evidence.empty()) keep_what_carries(search, poses, result);
   return result;
 }
 

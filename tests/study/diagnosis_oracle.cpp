@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "estimator/diagnosis/enlarged_fit.h"
 #include "estimator/effects/catalogue.h"
@@ -87,12 +88,39 @@ double fresh_error_mps2(const StudySet& set, const std::vector<PoseMean>& poses,
   return over_axes(mps2);
 }
 
+namespace {
+
+double mean_of(const SampleTable& samples, const std::string& column) {
+  const auto found = std::find_if(samples.covariates.begin(), samples.covariates.end(),
+                                  [&](const Covariate& c) { return c.name == column; });
+  assert(found != samples.covariates.end());
+  return std::accumulate(found->value.begin(), found->value.end(), 0.0) /
+         static_cast<double>(found->value.size());
+}
+
+/// What an effect that the simulator refers to a value of the room adds to the scale of its axes
+/// where the column has its mean.
+double added_at_mean(const StudySet& set, const sim::EffectSetting& effect) {
+  const SampleTable& samples = set.plain.run.samples;
+  const sim::Room& room = set.world.room;
+  if (effect.id == "own.ratiometric")
+    return -effect.parameters.at("c") * (mean_of(samples, "supply_V") / room.supply_V - 1);
+  if (effect.id == "own.swelling")
+    return effect.parameters.at("c") * (mean_of(samples, "rh_pct") - room.rh_pct);
+  return 0;
+}
+
+}  // namespace
+
 PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set) {
   PerAxis<Eigen::Vector4d> truth;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const auto& K = set.world.triad.K_V_per_g[i];
     truth[i] << K[0], K[1], K[2], set.world.triad.U0_V[i];
   }
+  for (const sim::EffectSetting& effect : set.effects)
+    for (const std::size_t i : effect.axes)
+      truth[i](static_cast<Eigen::Index>(i)) *= 1 + added_at_mean(set, effect);
   return truth;
 }
 

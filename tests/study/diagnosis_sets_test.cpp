@@ -364,5 +364,20 @@ TEST(DiagnosisSets, OneFunctionOfTheTurnThatStandsForALineAndATiltGivesWayToThem
   EXPECT_EQ(outcome.wrong, 0) << outcome.found;
 }
 
+// A straight line in the temperature is the likelier for having a name, and carries over to no pose
+// that was left out: it stood in the way of the play that does.
+TEST(DiagnosisSets, WhatDoesNotCarryOverStandsInTheWayOfNothing) {
+  const SetOutcome outcome = run_set({.seed = 1330003,
+                                      .effects = {"own.thermal_hysteresis"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::random,
+                                      .noise = NoiseKind::coloured,
+                                      .bits = 12,
+                                      .samples_per_pose = 50,
+                                      .static_s = 300});
+  expect_its_driver_and_no_listed_name(outcome);
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+}
+
 }  // namespace
 }  // namespace plumbline::study
