@@ -150,12 +150,16 @@ std::optional<std::size_t> what_worsens(const SearchInput& search,
   return {};
 }
 
-void drop_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
+/// Whether there was any.
+bool drop_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
                        const PerAxis<double>& before_mps2, SearchResult& found) {
+  bool any = false;
   while (const auto worst = what_worsens(search, poses, found, before_mps2)) {
+    any = true;
     found.remove(*worst);
     found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
   }
+  return any;
 }
 
 /// Of all candidates beside a model that has become smaller: what failed stays one for those who
@@ -197,8 +201,9 @@ std::vector<std::size_t> families_of(const SearchResult& found) {
   return families;
 }
 
-/// Searches; again without what makes poses that are left out worse or does not carry over to them:
-/// it may have stood in the way of what does.
+/// Searches; again without what makes poses that are left out worse, or where nothing carries over
+/// to them: what was found may have stood in the way of what does. Beside what does carry over, what
+/// else seemed to be there is chance, and another name for it would be, too.
 void search_past_what_fails(const SearchInput& search, const std::vector<PoseMean>& poses,
                             const PerAxis<double>& before_mps2, const SearchOptions& options,
                             ValidatedSearch& result) {
@@ -207,16 +212,17 @@ void search_past_what_fails(const SearchInput& search, const std::vector<PoseMea
   for (int k = 0; k < kMostSearches; ++k) {
     result.found = search_effects(search, open, options);
     const std::vector<std::size_t> families = families_of(result.found);
-    drop_what_worsens(search, poses, before_mps2, result.found);
+    const bool worsened = drop_what_worsens(search, poses, before_mps2, result.found);
     keep_what_carries(search, poses, result);
     std::vector<std::size_t> failed;
     const std::vector<std::size_t> kept = families_of(result.found);
     std::set_difference(families.begin(), families.end(), kept.begin(), kept.end(),
                         std::back_inserter(failed));
-    if (failed.empty()) break;
+    if (failed.empty()) return;
     std::erase_if(open.candidates, [&](const Candidate& candidate) {
       return std::binary_search(failed.begin(), failed.end(), candidate.family);
     });
+    if (!worsened && !result.found.evidence.empty()) break;
   }
   if (open.candidates.size() < result.candidates.candidates.size()) renew_responses(search, result);
 }

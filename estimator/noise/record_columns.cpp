@@ -21,7 +21,7 @@ constexpr std::size_t kFewestSamples = 8;  // of a span
 // Of −2 ln L: one column in a thousand that has nothing to do with the record.
 constexpr double kClearly = 11;
 // What an answer must gain besides that is one of many.
-constexpr double kPriceOfShape = 13;
+constexpr double kPriceOfShape = 15;
 constexpr std::size_t kMostTaken = 4;
 constexpr std::size_t kShapesRefined = 4;
 
@@ -78,14 +78,19 @@ std::vector<Answer> shapes_of(const Eigen::VectorXd& mean) {
   Eigen::VectorXd sorted = mean;
   std::sort(sorted.begin(), sorted.end());
   const double range = sorted(sorted.size() - 1) - sorted(0);
-  for (const double share : {0.15, 0.3, 0.45, 0.6, 0.75})
-    for (const double start : {-1.0, 0.0, 1.0}) answers.push_back(play(share * range, start));
+  constexpr double kNarrowest = 0.06, kWidest = 0.9, kWider = 1.2;  // of the range
+  for (double share = kNarrowest; share < kWidest; share *= kWider)
+    for (const double start : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+      const Answer follower = play(share * range, start);
+      answers.push_back(follower);
+      answers.push_back([=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - follower(x)); });
+    }
   for (const double share : {0.02, 0.05, 0.1, 0.2, 0.4}) {
     answers.push_back([=](const Eigen::VectorXd& x) { return past(x, share); });
     answers.push_back(
         [=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - past(x, share)); });
   }
-  for (const double quantile : {0.15, 0.3, 0.5, 0.7, 0.85}) {
+  for (const double quantile : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9}) {
     const double at =
         sorted(static_cast<Eigen::Index>(quantile * static_cast<double>(sorted.size())));
     answers.push_back(

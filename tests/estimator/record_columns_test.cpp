@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -110,6 +111,24 @@ TEST(RecordColumns, TwoColumnsBesideARandomWalk) {
   // The walk is still there to be identified.
   const NoiseModel after = identify_noise(record, 1 / kStep_s);
   EXPECT_TRUE(after.K.present);
+  EXPECT_NEAR(after.K.value, kWalk_V / std::sqrt(kStep_s), 0.5 * kWalk_V / std::sqrt(kStep_s));
+}
+
+// Beside a walk neither the line nor the play alone says anything: only one less the other.
+TEST(RecordColumns, WhatAPlayKeepsBackOfALineIsTakenOut) {
+  Draw draw(7);
+  std::vector<double> temp_C(kSamples), kept_back(kSamples);
+  double at = 0;
+  for (std::size_t k = 0; k < kSamples; ++k) {
+    const double turns = 1.4 * static_cast<double>(k) / kSamples;
+    temp_C[k] = std::sin(2 * std::numbers::pi * turns);
+    at = std::clamp(at, temp_C[k] - 0.25, temp_C[k] + 0.25);
+    kept_back[k] = at - temp_C[k];
+  }
+  const SampleTable table = table_with(temp_C, draw.walk(0.001));
+  std::vector<double> record = sum(sum(draw.white(kWhite_V), draw.walk(kWalk_V)), kept_back, 2e-3);
+  EXPECT_EQ(take_out_columns(record, table, 0, kStep_s), std::vector<std::string>{"temp_C"});
+  const NoiseModel after = identify_noise(record, 1 / kStep_s);
   EXPECT_NEAR(after.K.value, kWalk_V / std::sqrt(kStep_s), 0.5 * kWalk_V / std::sqrt(kStep_s));
 }
 
