@@ -202,8 +202,8 @@ std::vector<std::size_t> families_of(const SearchResult& found) {
 }
 
 /// Searches; again without what makes poses that are left out worse, or where nothing carries over
-/// to them: what was found may have stood in the way of what does. Beside what does carry over, what
-/// else seemed to be there is chance, and another name for it would be, too.
+/// to them: what was found may have stood in the way of what does. Beside what does carry over,
+/// what else seemed to be there is chance, and another name for it would be, too.
 void search_past_what_fails(const SearchInput& search, const std::vector<PoseMean>& poses,
                             const PerAxis<double>& before_mps2, const SearchOptions& options,
                             ValidatedSearch& result) {

@@ -78,10 +78,11 @@ std::vector<Answer> shapes_of(const Eigen::VectorXd& mean) {
   Eigen::VectorXd sorted = mean;
   std::sort(sorted.begin(), sorted.end());
   const double range = sorted(sorted.size() - 1) - sorted(0);
-  constexpr double kNarrowest = 0.06, kWidest = 0.9, kWider = 1.2;  // of the range
-  for (double share = kNarrowest; share < kWidest; share *= kWider)
+  constexpr double kNarrowest = 0.06, kWider = 1.2;
+  constexpr int kWidths = 15;  // up to 0.8 of the range
+  for (int k = 0; k < kWidths; ++k)
     for (const double start : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
-      const Answer follower = play(share * range, start);
+      const Answer follower = play(kNarrowest * std::pow(kWider, k) * range, start);
       answers.push_back(follower);
       answers.push_back([=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - follower(x)); });
     }
