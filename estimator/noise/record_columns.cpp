@@ -21,9 +21,9 @@ constexpr std::size_t kFewestSamples = 8;  // of a span
 // Of −2 ln L: one column in a thousand that has nothing to do with the record.
 constexpr double kClearly = 11;
 // What an answer must gain besides that is one of many.
-constexpr double kPriceOfShape = 15;
+constexpr double kPriceOfShape = 13;
 constexpr std::size_t kMostTaken = 4;
-constexpr std::size_t kShapesRefined = 4;
+constexpr std::size_t kShapesRefined = 6;
 
 using Values = Eigen::Map<const Eigen::VectorXd>;
 
@@ -170,7 +170,8 @@ std::vector<const Column*> worth_a_look(const std::vector<Column>& columns,
   return worth;
 }
 
-/// Of shapes the few that promise most in this noise, with their answers at the samples.
+/// Of shapes the few that promise most in this noise, with their answers at the samples. Of those
+/// that are nearly the same the best one.
 std::vector<Column> likeliest_shapes(const std::vector<const Column*>& columns,
                                      const PooledNoise& noise, const Eigen::MatrixXd& design,
                                      const Eigen::VectorXd& mean, const Spans& spans) {
@@ -180,19 +181,34 @@ std::vector<Column> likeliest_shapes(const std::vector<const Column*>& columns,
     return remainder.of(factor.matrixL().solve(v));
   };
   const Eigen::VectorXd left = left_of(mean);
-  std::vector<std::pair<double, const Column*>> promised;
+  struct Promise {
+    double gain = 0;
+    const Column* column = nullptr;
+    Eigen::VectorXd direction = {};
+  };
+  std::vector<Promise> promised;
   for (const Column* column : columns) {
     if (column->price == 0) continue;
-    const Eigen::VectorXd other = left_of(column->mean);
-    const double square = other.squaredNorm();
-    if (square > 0) promised.emplace_back(-left.dot(other) * left.dot(other) / square, column);
+    Eigen::VectorXd other = left_of(column->mean);
+    const double size = other.norm();
+    if (!(size > 0)) continue;
+    other /= size;
+    promised.push_back({left.dot(other) * left.dot(other), column, std::move(other)});
   }
-  std::sort(promised.begin(), promised.end());
+  std::stable_sort(promised.begin(), promised.end(),
+                   [](const Promise& a, const Promise& b) { return a.gain > b.gain; });
+  constexpr double kSame = 0.98;  // cosine
   std::vector<Column> likeliest;
-  for (const auto& [gain, column] : promised) {
+  std::vector<const Eigen::VectorXd*> directions;
+  for (const Promise& promise : promised) {
     if (likeliest.size() == kShapesRefined) break;
-    likeliest.push_back(*column);
-    const Eigen::VectorXd answer = column->at_samples();
+    if (std::any_of(directions.begin(), directions.end(), [&](const Eigen::VectorXd* taken) {
+          return std::abs(taken->dot(promise.direction)) > kSame;
+        }))
+      continue;
+    directions.push_back(&promise.direction);
+    likeliest.push_back(*promise.column);
+    const Eigen::VectorXd answer = likeliest.back().at_samples();
     likeliest.back().mean = centred(spans.means(Values(answer.data(), answer.size())));
   }
   return likeliest;
