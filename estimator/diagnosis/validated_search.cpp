@@ -150,16 +150,12 @@ std::optional<std::size_t> what_worsens(const SearchInput& search,
   return {};
 }
 
-/// Whether there was any.
-bool drop_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
+void drop_what_worsens(const SearchInput& search, const std::vector<PoseMean>& poses,
                        const PerAxis<double>& before_mps2, SearchResult& found) {
-  bool any = false;
   while (const auto worst = what_worsens(search, poses, found, before_mps2)) {
-    any = true;
     found.remove(*worst);
     found.fit = fit_enlarged(search.log, found.observed, found.whitening, found.fit.parameters);
   }
-  return any;
 }
 
 /// Of all candidates beside a model that has become smaller: what failed stays one for those who
@@ -212,7 +208,8 @@ void search_past_what_fails(const SearchInput& search, const std::vector<PoseMea
   for (int k = 0; k < kMostSearches; ++k) {
     result.found = search_effects(search, open, options);
     const std::vector<std::size_t> families = families_of(result.found);
-    const bool worsened = drop_what_worsens(search, poses, before_mps2, result.found);
+    drop_what_worsens(search, poses, before_mps2, result.found);
+    const bool worsened = result.found.evidence.size() < families.size();
     keep_what_carries(search, poses, result);
     std::vector<std::size_t> failed;
     const std::vector<std::size_t> kept = families_of(result.found);

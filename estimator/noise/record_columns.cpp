@@ -78,19 +78,17 @@ std::vector<Answer> shapes_of(const Eigen::VectorXd& mean) {
   Eigen::VectorXd sorted = mean;
   std::sort(sorted.begin(), sorted.end());
   const double range = sorted(sorted.size() - 1) - sorted(0);
+  const auto add_with_its_rest = [&](const Answer& follower) {
+    answers.push_back(follower);
+    answers.push_back([=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - follower(x)); });
+  };
   constexpr double kNarrowest = 0.06, kWider = 1.2;
   constexpr int kWidths = 15;  // up to 0.8 of the range
   for (int k = 0; k < kWidths; ++k)
-    for (const double start : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
-      const Answer follower = play(kNarrowest * std::pow(kWider, k) * range, start);
-      answers.push_back(follower);
-      answers.push_back([=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - follower(x)); });
-    }
-  for (const double share : {0.02, 0.05, 0.1, 0.2, 0.4}) {
-    answers.push_back([=](const Eigen::VectorXd& x) { return past(x, share); });
-    answers.push_back(
-        [=](const Eigen::VectorXd& x) { return Eigen::VectorXd(x - past(x, share)); });
-  }
+    for (const double start : {-1.0, -0.5, 0.0, 0.5, 1.0})
+      add_with_its_rest(play(kNarrowest * std::pow(kWider, k) * range, start));
+  for (const double share : {0.02, 0.05, 0.1, 0.2, 0.4})
+    add_with_its_rest([=](const Eigen::VectorXd& x) { return past(x, share); });
   for (const double quantile : {0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9}) {
     const double at =
         sorted(static_cast<Eigen::Index>(quantile * static_cast<double>(sorted.size())));

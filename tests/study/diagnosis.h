@@ -117,6 +117,8 @@ struct StudySet {
   bool feasible = true;       ///< every effect could be scaled to the size
 };
 StudySet make_set(const SetDesign& design);
+/// Over all samples; the column must be there.
+double mean_of_column(const SampleTable& samples, const std::string& name);
 /// Run and verification as that world would give them without noise and rounding.
 sim::RecordedSet record_without_noise(const SetDesign& design, const sim::World& world);
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numeric>
 
 #include "estimator/diagnosis/enlarged_fit.h"
 #include "estimator/effects/catalogue.h"
@@ -90,23 +89,15 @@ double fresh_error_mps2(const StudySet& set, const std::vector<PoseMean>& poses,
 
 namespace {
 
-double mean_of(const SampleTable& samples, const std::string& column) {
-  const auto found = std::find_if(samples.covariates.begin(), samples.covariates.end(),
-                                  [&](const Covariate& c) { return c.name == column; });
-  assert(found != samples.covariates.end());
-  return std::accumulate(found->value.begin(), found->value.end(), 0.0) /
-         static_cast<double>(found->value.size());
-}
-
 /// What an effect that the simulator refers to a value of the room adds to the scale of its axes
 /// where the column has its mean.
 double added_at_mean(const StudySet& set, const sim::EffectSetting& effect) {
   const SampleTable& samples = set.plain.run.samples;
   const sim::Room& room = set.world.room;
   if (effect.id == "own.ratiometric")
-    return -effect.parameters.at("c") * (mean_of(samples, "supply_V") / room.supply_V - 1);
+    return -effect.parameters.at("c") * (mean_of_column(samples, "supply_V") / room.supply_V - 1);
   if (effect.id == "own.swelling")
-    return effect.parameters.at("c") * (mean_of(samples, "rh_pct") - room.rh_pct);
+    return effect.parameters.at("c") * (mean_of_column(samples, "rh_pct") - room.rh_pct);
   return 0;
 }
 

@@ -230,8 +230,7 @@ Template make_template(const std::string& name, const SetDesign& design, const s
 void refer_to_mean(const SampleTable& samples, sim::EffectSetting& effect) {
   for (const Covariate& column : samples.covariates)
     if (effect.id == "covariate:" + column.name)
-      effect.parameters["mean"] = std::accumulate(column.value.begin(), column.value.end(), 0.0) /
-                                  static_cast<double>(column.value.size());
+      effect.parameters["mean"] = mean_of_column(samples, column.name);
 }
 
 /// √(Δχ²) that the change of the pose means is worth under the true noise, all axes together.
@@ -362,6 +361,14 @@ sim::World study_world(const SetDesign& design) {
     for (auto& axis : world.drive.axis) axis.speed_deg_s = axis.acceleration_deg_s2 = 1e9;
   }
   return world;
+}
+
+double mean_of_column(const SampleTable& samples, const std::string& name) {
+  const auto column = std::find_if(samples.covariates.begin(), samples.covariates.end(),
+                                   [&](const Covariate& c) { return c.name == name; });
+  assert(column != samples.covariates.end());
+  return std::accumulate(column->value.begin(), column->value.end(), 0.0) /
+         static_cast<double>(column->value.size());
 }
 
 StudySet make_set(const SetDesign& design) {
