@@ -33,10 +33,7 @@ class DrivenTerm : public SmoothTerm {
   bool at_converter() const override { return driver_->output_of.has_value(); }
   bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
   bool guesses_at_start() const override { return !driver_->past.empty(); }
-  std::vector<std::string> columns() const override {
-    if (!driver_->recorded) return {};
-    return {recorded_column(driver_->name)};
-  }
+  std::vector<std::string> columns() const override { return driver_->columns(); }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     displace_by_number(log, visit, of_visit(0, visit, p), head);

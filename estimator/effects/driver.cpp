@@ -129,6 +129,11 @@ bool Driver::varies() const {
   });
 }
 
+std::vector<std::string> Driver::columns() const {
+  if (!recorded) return {};
+  return {recorded_column(name)};
+}
+
 std::string recorded_column(const std::string& driver) {
   return driver.substr(0, driver.find(".rate"));
 }

@@ -41,6 +41,8 @@ struct Driver {
   bool way_begins(std::size_t visit) const { return visit == 0 || visit == begins_anew; }
   bool is_clock() const { return name == "t_s"; }
   bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column
+  /// What has to be recorded for it; none of what the positions and the clock tell.
+  std::vector<std::string> columns() const;
 };
 using DriverPointer = std::shared_ptr<const Driver>;
 

@@ -61,10 +61,7 @@ class Memory {
 
   const std::string& name() const { return name_; }
   std::string unit() const { return driver_->unit(); }
-  std::vector<std::string> columns() const {
-    if (!driver_->recorded) return {};
-    return {recorded_column(driver_->name)};
-  }
+  std::vector<std::string> columns() const { return driver_->columns(); }
   /// At which U₀ and K are stated.
   double reference() const { return less_average_ ? 0 : driver_->reference.value_or(0); }
   /// Of an attitude, nothing when the head has long been at rest: the 12 parameters are those of
