@@ -215,7 +215,7 @@ Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   parallel_for(kAxisCount, [&](std::size_t axis) {
     const auto i = static_cast<Eigen::Index>(axis);
     apply_to_means(axis, whitened.middleRows(i * n, n));
-    const Eigen::Index contrasts = dwell_sd_V[axis].size();
+    const Eigen::Index contrasts = all.rows() > kAxes * n ? dwell_sd_V[axis].size() : 0;
     for (Eigen::Index d = 0; d < contrasts; ++d)
       whitened.middleRows((kAxes + i * contrasts + d) * n, n) /= dwell_sd_V[axis](d);
   });
@@ -232,39 +232,38 @@ struct Tangent {
 
 /// Of a fit at its parameters, which gets its Jacobian; nothing where that does not determine them.
 std::optional<Tangent> tangent_at(const VisitLog& log, const PoseWhitening& whitening,
-                                  Eigen::Index rows, EnlargedFit& fit) {
+                                  EnlargedFit& fit) {
   constexpr double kDetermined = 1e-5;  // above what differences leave of a column that is none
   fit.whitened_jacobian = whitening.apply(prediction_jacobian(log, fit.parameters));
   Eigen::VectorXd norms = fit.whitened_jacobian.colwise().norm();
   if (!(norms.minCoeff() > 0)) return {};
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian.topRows(rows) *
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(fit.whitened_jacobian *
                                                  norms.cwiseInverse().asDiagonal());
   const auto diagonal = qr.matrixR().diagonal().cwiseAbs();
   if (!(diagonal.minCoeff() > kDetermined * diagonal.maxCoeff())) return {};
   return Tangent{std::move(norms), std::move(qr)};
 }
 
-}  // namespace
-
-EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
-                         const PoseWhitening& whitening, const EnlargedParameters& start,
-                         int most_iterations) {
+/// fit_enlarged() with the Jacobian of the rows that the model can move only.
+EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
+                           const PoseWhitening& whitening, const EnlargedParameters& start,
+                           int most_iterations) {
   // The last digits of a model that is far from the readings tell nothing: it is only compared.
   constexpr double kLastDigits = 1e-6, kShareOfExcess = 1e-5;
   constexpr double kMostOfASize = 10;  // by its uncertainty it might be many times what it is
-  const Eigen::Index rows =
-      has_effect_within_dwell(start) ? stacked_rows(log) : mean_rows(log);  // that are not zero
+  const Eigen::Index rows = moved_rows(log, start);
   const Eigen::VectorXd measured = stacked_V(observed);
   const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
-    return whitening.apply(measured - predict_stacked_V(log, parameters));
+    return whitening.apply(measured.head(rows) - predict_stacked_V(log, parameters).head(rows));
   };
   EnlargedFit fit;
   fit.parameters = start;
-  fit.whitened_residual = whitened_residual(start);
+  fit.whitened_residual = whitening.apply(measured - predict_stacked_V(log, start));
+  const double unmoved_chi2 = fit.whitened_residual.tail(measured.size() - rows).squaredNorm();
   fit.chi2 = fit.whitened_residual.squaredNorm();
   EnlargedParameters tangent_of = start;
   for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
-    const std::optional<Tangent> tangent = tangent_at(log, whitening, rows, fit);
+    const std::optional<Tangent> tangent = tangent_at(log, whitening, fit);
     fit.determined = tangent.has_value();
     if (!tangent) return fit;
     tangent_of = fit.parameters;
@@ -280,13 +279,13 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
         return;
       }
       const Eigen::VectorXd residual = whitened_residual(trial);
-      const double chi2 = residual.squaredNorm();
+      const double chi2 = residual.squaredNorm() + unmoved_chi2;
       if (!(chi2 <= fit.chi2 * (1 + 1e-12))) return;
       improved = true;
       const double excess = std::max(0.0, chi2 - 2 * static_cast<double>(rows));
       fit.converged = fit.chi2 - chi2 < kLastDigits + kShareOfExcess * excess;
       fit.parameters = trial;
-      fit.whitened_residual = residual;
+      fit.whitened_residual.head(rows) = residual;
       fit.chi2 = chi2;
     };
     const auto try_steps = [&](bool stopping_short) {
@@ -299,8 +298,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     if (!improved) {
       // Along what the readings hardly determine, the tangent leads nowhere: shorter there only
       // (Levenberg, Marquardt).
-      const Eigen::MatrixXd scaled =
-          fit.whitened_jacobian.topRows(rows) * norms.cwiseInverse().asDiagonal();
+      const Eigen::MatrixXd scaled = fit.whitened_jacobian * norms.cwiseInverse().asDiagonal();
       const Eigen::MatrixXd normal = scaled.transpose() * scaled;
       const Eigen::VectorXd slope = scaled.transpose() * fit.whitened_residual.head(rows);
       for (double damping = 1e-6; damping <= 1 && !improved; damping *= 100) {
@@ -324,7 +322,7 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
     if (!improved) fit.converged = true;  // no direction leads down any more
   }
   // A shape may have come to where it does nothing: an edge between two readings.
-  if (shapes_differ(fit.parameters, tangent_of) && !tangent_at(log, whitening, rows, fit)) {
+  if (shapes_differ(fit.parameters, tangent_of) && !tangent_at(log, whitening, fit)) {
     fit.determined = false;
     return fit;
   }
@@ -332,6 +330,18 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
   fit.determined = keeps_sensitivities(fit.parameters, start, kLikelyChange) &&
                    !cancel_each_other(fit) && !leave_a_sensitivity_open(fit) &&
                    !leaves_a_size_open(fit, kMostOfASize);
+  return fit;
+}
+
+}  // namespace
+
+EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
+                         const PoseWhitening& whitening, const EnlargedParameters& start,
+                         int most_iterations) {
+  EnlargedFit fit = fit_moved_rows(log, observed, whitening, start, most_iterations);
+  const Eigen::Index rows = fit.whitened_jacobian.rows();
+  fit.whitened_jacobian.conservativeResize(stacked_rows(log), Eigen::NoChange);
+  fit.whitened_jacobian.bottomRows(stacked_rows(log) - rows).setZero();
   return fit;
 }
 

@@ -16,7 +16,7 @@ struct PoseWhitening {
   void set(std::size_t axis, const Eigen::MatrixXd& covariance_V2);
   /// Whitens n rows, the means of one axis, in place.
   void apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const;
-  /// Whitens a matrix of stacked rows.
+  /// Whitens a matrix of stacked rows, or of the means alone.
   Eigen::MatrixXd apply(const Eigen::MatrixXd& stacked) const;
 };
 

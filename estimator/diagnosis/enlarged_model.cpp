@@ -1,9 +1,9 @@
 #include "estimator/diagnosis/enlarged_model.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
-#include <utility>
+#include <optional>
+#include <vector>
 
 #include "estimator/parallel_for.h"
 
@@ -12,135 +12,58 @@ namespace {
 
 constexpr Eigen::Index kAxes = static_cast<Eigen::Index>(kAxisCount);
 
-// A step that changes the prediction well above rounding and well below curvature.
-double difference_step(const ParameterInfo& info, double value) {
-  if (info.step > 0) return info.step;
-  if (info.role == ParameterRole::shape) return 1e-3 * std::max(std::abs(value), 1e-9);
-  // Amplitudes: terms of 1e-5 g, angles of 1e-5 degrees and the like.
-  return std::max(1e-3 * std::abs(value), 1e-6);
+using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
+
+/// numbers_of_visits() of each effect, for models that differ in other parameters; where an effect
+/// has none here, its term is worked out.
+using VisitNumbers = std::vector<std::vector<double>>;
+
+VisitNumbers no_numbers(const EnlargedParameters& parameters) {
+  return VisitNumbers(parameters.effects.size());
+}
+
+std::vector<double> numbers_of(const VisitLog& log, const ActiveEffect& active) {
+  return active.effect->numbers_of_visits(log, active.axis, active.p.data());
+}
+
+HeadGeometry head_geometry(const VisitLog& log, const EnlargedParameters& parameters,
+                           const VisitNumbers& numbers, std::size_t visit) {
+  HeadGeometry head{log.visits[visit].delta_rad, log.visits[visit].h_rad};
+  for (std::size_t e = 0; e < parameters.effects.size(); ++e) {
+    const ActiveEffect& active = parameters.effects[e];
+    if (active.effect->subject() != Subject::head) continue;
+    if (numbers[e].empty())
+      active.effect->displace(log, visit, active.p.data(), head);
+    else
+      active.effect->displace_by_number(log, visit, numbers[e][visit], head);
+  }
+  return head;
+}
+
+Forces specific_forces_g(const VisitLog& log, const EnlargedParameters& parameters,
+                         const VisitNumbers& numbers) {
+  Forces a_g;
+  a_g.reserve(log.visits.size());
+  for (std::size_t k = 0; k < log.visits.size(); ++k)
+    a_g.push_back(specific_force_g(head_geometry(log, parameters, numbers, k), log.gamma));
+  return a_g;
 }
 
 }  // namespace
-
-std::vector<std::size_t> axes_of(const ActiveEffect& active) {
-  if (active.effect->subject() == Subject::head) return {0, 1, 2};
-  return {active.axis};
-}
-
-ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis) {
-  ActiveEffect active{&effect, axis, hypothesis.p, {}};
-  const auto parameters = effect.parameters();
-  assert(parameters.size() == hypothesis.p.size());
-  for (std::size_t k = 0; k < parameters.size(); ++k) {
-    active.free.push_back(parameters[k].role == ParameterRole::shape ||
-                          (parameters[k].role == ParameterRole::amplitude && hypothesis.p[k] != 0));
-  }
-  return active;
-}
-
-namespace {
-
-ActiveEffect with_shapes(ActiveEffect active, bool free) {
-  const auto infos = active.effect->parameters();
-  for (std::size_t k = 0; k < infos.size(); ++k)
-    if (infos[k].role == ParameterRole::shape) active.free[k] = free;
-  return active;
-}
-
-}  // namespace
-
-ActiveEffect with_shapes_held(ActiveEffect active) { return with_shapes(std::move(active), false); }
-
-ActiveEffect with_shapes_free(ActiveEffect active) { return with_shapes(std::move(active), true); }
-
-Eigen::Index ActiveEffect::free_count() const { return std::count(free.begin(), free.end(), true); }
-
-Eigen::Index EnlargedParameters::free_count() const { return first_free(effects.size()); }
-
-Eigen::Index EnlargedParameters::first_free(std::size_t effect) const {
-  Eigen::Index count = 4 * kAxes;
-  for (std::size_t e = 0; e < effect; ++e) count += effects[e].free_count();
-  return count;
-}
-
-Eigen::VectorXd EnlargedParameters::free_values() const {
-  Eigen::VectorXd values(free_count());
-  Eigen::Index row = 0;
-  for (const auto& axis : twelve) {
-    values.segment<4>(row) = axis;
-    row += 4;
-  }
-  for (const ActiveEffect& active : effects) {
-    for (std::size_t k = 0; k < active.p.size(); ++k) {
-      if (active.free[k]) values(row++) = active.p[k];
-    }
-  }
-  return values;
-}
-
-void EnlargedParameters::set_free_values(const Eigen::VectorXd& values) {
-  assert(values.size() == free_count());
-  Eigen::Index row = 0;
-  for (auto& axis : twelve) {
-    axis = values.segment<4>(row);
-    row += 4;
-  }
-  for (ActiveEffect& active : effects) {
-    for (std::size_t k = 0; k < active.p.size(); ++k) {
-      if (active.free[k]) active.p[k] = values(row++);
-    }
-  }
-}
-
-double EnlargedParameters::mps2_per_V(std::size_t axis) const {
-  return kStandardGravity_mps2 / twelve[axis](static_cast<Eigen::Index>(axis));
-}
-
-bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other) {
-  for (std::size_t e = 0; e < one.effects.size(); ++e) {
-    const ActiveEffect& active = one.effects[e];
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (active.free[k] && infos[k].role == ParameterRole::shape &&
-          std::abs(active.p[k] - other.effects[e].p[k]) > difference_step(infos[k], active.p[k]))
-        return true;
-  }
-  return false;
-}
 
 std::vector<HeadGeometry> head_geometries(const VisitLog& log,
                                           const EnlargedParameters& parameters) {
+  const VisitNumbers numbers = no_numbers(parameters);
   std::vector<HeadGeometry> heads;
   heads.reserve(log.visits.size());
-  for (std::size_t k = 0; k < log.visits.size(); ++k) {
-    HeadGeometry head{log.visits[k].delta_rad, log.visits[k].h_rad};
-    for (const ActiveEffect& active : parameters.effects) {
-      if (active.effect->subject() == Subject::head) {
-        active.effect->displace(log, k, active.p.data(), head);
-      }
-    }
-    heads.push_back(head);
-  }
+  for (std::size_t k = 0; k < log.visits.size(); ++k)
+    heads.push_back(head_geometry(log, parameters, numbers, k));
   return heads;
 }
 
 std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
                                                const EnlargedParameters& parameters) {
-  std::vector<Eigen::Vector3d> a_g;
-  a_g.reserve(log.visits.size());
-  for (const HeadGeometry& head : head_geometries(log, parameters))
-    a_g.push_back(specific_force_g(head, log.gamma));
-  return a_g;
-}
-
-EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active) {
-  model.effects.push_back(active);
-  return model;
-}
-
-EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect) {
-  model.effects.erase(model.effects.begin() + static_cast<std::ptrdiff_t>(effect));
-  return model;
+  return specific_forces_g(log, parameters, no_numbers(parameters));
 }
 
 HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometry& head,
@@ -157,8 +80,6 @@ HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometr
 
 namespace {
 
-using Forces = std::vector<Eigen::Vector3d>;  ///< one per visit, g
-
 /// Without the effects of the model.
 TermInput bare_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::size_t axis,
                      const Forces& a_g, std::size_t visit) {
@@ -167,39 +88,55 @@ TermInput bare_input(const VisitLog& log, const Eigen::Vector4d& twelve, std::si
   return {log, visit, axis, a_g, response_V / K_ii, twelve(3) + response_V, K_ii};
 }
 
-bool is_of_sensor(const ActiveEffect& active, std::size_t axis) {
-  return active.effect->subject() == Subject::sensor && active.axis == axis;
+double term_V(const ActiveEffect& active, const std::vector<double>& numbers,
+              const TermInput& input) {
+  return input.K_V_per_g * (numbers.empty()
+                                ? active.effect->term_g(input, active.p.data())
+                                : active.effect->term_of_number_g(input, numbers[input.visit]));
 }
 
 /// Sum of the axis's terms at one visit that are the converter's, or of those that are not.
-double terms_V(const EnlargedParameters& parameters, const TermInput& input, bool at_converter) {
+double terms_V(const EnlargedParameters& parameters, const VisitNumbers& numbers,
+               const TermInput& input, bool at_converter) {
   double sum_V = 0;
-  for (const ActiveEffect& active : parameters.effects)
+  for (std::size_t e = 0; e < parameters.effects.size(); ++e) {
+    const ActiveEffect& active = parameters.effects[e];
     if (is_of_sensor(active, input.axis) && active.effect->at_converter() == at_converter)
-      sum_V += input.K_V_per_g * active.effect->term_g(input, active.p.data());
+      sum_V += term_V(active, numbers[e], input);
+  }
   return sum_V;
+}
+
+TermInput term_input(const VisitLog& log, const EnlargedParameters& parameters,
+                     const VisitNumbers& numbers, std::size_t axis, const Forces& a_g,
+                     std::size_t visit) {
+  TermInput input = bare_input(log, parameters.twelve[axis], axis, a_g, visit);
+  input.output_V += terms_V(parameters, numbers, input, false);
+  return input;
+}
+
+double mean_V(const VisitLog& log, const EnlargedParameters& parameters,
+              const VisitNumbers& numbers, std::size_t axis, const Forces& a_g, std::size_t visit) {
+  const TermInput input = term_input(log, parameters, numbers, axis, a_g, visit);
+  return input.output_V + terms_V(parameters, numbers, input, true);
+}
+
+Eigen::VectorXd means_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
+                                const VisitNumbers& numbers, std::size_t axis, const Forces& a_g) {
+  Eigen::VectorXd means_V(std::ssize(a_g));
+  for (Eigen::Index k = 0; k < means_V.size(); ++k)
+    means_V(k) = mean_V(log, parameters, numbers, axis, a_g, static_cast<std::size_t>(k));
+  return means_V;
 }
 
 }  // namespace
 
 TermInput term_input(const VisitLog& log, const EnlargedParameters& parameters, std::size_t axis,
                      const Forces& a_g, std::size_t visit) {
-  TermInput input = bare_input(log, parameters.twelve[axis], axis, a_g, visit);
-  input.output_V += terms_V(parameters, input, false);
-  return input;
+  return term_input(log, parameters, no_numbers(parameters), axis, a_g, visit);
 }
 
 namespace {
-
-Eigen::VectorXd means_of_axis_V(const VisitLog& log, const EnlargedParameters& parameters,
-                                std::size_t axis, const Forces& a_g) {
-  Eigen::VectorXd mean_V(std::ssize(a_g));
-  for (Eigen::Index k = 0; k < mean_V.size(); ++k) {
-    const TermInput input = term_input(log, parameters, axis, a_g, static_cast<std::size_t>(k));
-    mean_V(k) = input.output_V + terms_V(parameters, input, true);
-  }
-  return mean_V;
-}
 
 /// What the head does within the dwells, seen by all axes.
 struct HeadAtVisit {
@@ -224,11 +161,12 @@ Eigen::MatrixXd dwells_of_axis_V(const VisitLog& log, const EnlargedParameters& 
                                  const std::vector<HeadAtVisit>& head) {
   Eigen::MatrixXd dwell_V = Eigen::MatrixXd::Zero(std::ssize(a_g), log.dwell_contrasts());
   if (!has_effect_within_dwell(parameters)) return dwell_V;
+  const VisitNumbers numbers = no_numbers(parameters);
   for (const ActiveEffect& active : parameters.effects) {
     if (!is_of_sensor(active, axis) || !active.effect->within_dwell()) continue;
     for (Eigen::Index k = 0; k < dwell_V.rows(); ++k)
       dwell_V.row(k) += dwell_contrasts_V(
-          term_input(log, parameters, axis, a_g, static_cast<std::size_t>(k)), active);
+          term_input(log, parameters, numbers, axis, a_g, static_cast<std::size_t>(k)), active);
   }
   for (const auto& [visit, course] : head)
     dwell_V.row(visit) += course.contrasts_V(parameters.twelve[axis]);
@@ -246,16 +184,6 @@ PerAxis<Eigen::MatrixXd> dwells_V(const VisitLog& log, const EnlargedParameters&
 
 }  // namespace
 
-bool has_effect_within_dwell(const EnlargedParameters& parameters) {
-  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
-                     [](const ActiveEffect& active) { return active.effect->within_dwell(); });
-}
-
-bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis) {
-  return std::any_of(parameters.effects.begin(), parameters.effects.end(),
-                     [&](const ActiveEffect& active) { return is_of_sensor(active, axis); });
-}
-
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
                                          const EnlargedParameters& parameters) {
   return predict_means_V(log, parameters, specific_forces_g(log, parameters));
@@ -263,9 +191,11 @@ PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log,
 
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters,
                                          const Forces& a_g) {
-  PerAxis<Eigen::VectorXd> mean_V;
-  for (std::size_t i = 0; i < kAxisCount; ++i) mean_V[i] = means_of_axis_V(log, parameters, i, a_g);
-  return mean_V;
+  const VisitNumbers numbers = no_numbers(parameters);
+  PerAxis<Eigen::VectorXd> means_V;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    means_V[i] = means_of_axis_V(log, parameters, numbers, i, a_g);
+  return means_V;
 }
 
 Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active) {
@@ -299,6 +229,9 @@ Eigen::Index mean_rows(const VisitLog& log) { return kAxes * std::ssize(log.visi
 Eigen::Index stacked_rows(const VisitLog& log) {
   return (1 + log.dwell_contrasts()) * mean_rows(log);
 }
+Eigen::Index moved_rows(const VisitLog& log, const EnlargedParameters& parameters) {
+  return has_effect_within_dwell(parameters) ? stacked_rows(log) : mean_rows(log);
+}
 
 namespace {
 
@@ -315,25 +248,186 @@ Eigen::VectorXd stacked(const PerAxis<Eigen::VectorXd>& mean_V,
   return all;
 }
 
+// A step that changes the prediction well above rounding and well below curvature.
+double difference_step(const ParameterInfo& info, double value) {
+  if (info.step > 0) return info.step;
+  if (info.role == ParameterRole::shape) return 1e-3 * std::max(std::abs(value), 1e-9);
+  // Amplitudes: terms of 1e-5 g, angles of 1e-5 degrees and the like.
+  return std::max(1e-3 * std::abs(value), 1e-6);
+}
+
 /// What one column of the Jacobian is about.
 struct FreeParameter {
-  std::optional<std::size_t> axis;  ///< the only one that it concerns
-  double step;                      ///< of the central difference
+  std::optional<std::size_t> effect;  ///< none: one of the twelve
+  std::optional<std::size_t> axis;    ///< the only one that it concerns
+  double step;                        ///< of the central difference
 };
 
 std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters) {
   std::vector<FreeParameter> all;
-  for (std::size_t i = 0; i < 4 * kAxisCount; ++i) all.push_back({i / 4, 1e-6});
-  for (const ActiveEffect& active : parameters.effects) {
+  for (std::size_t i = 0; i < 4 * kAxisCount; ++i) all.push_back({{}, i / 4, 1e-6});
+  for (std::size_t e = 0; e < parameters.effects.size(); ++e) {
+    const ActiveEffect& active = parameters.effects[e];
     const auto infos = active.effect->parameters();
     std::optional<std::size_t> axis;
     if (active.effect->subject() == Subject::sensor) axis = active.axis;
-    for (std::size_t k = 0; k < active.p.size(); ++k) {
-      if (active.free[k]) all.push_back({axis, difference_step(infos[k], active.p[k])});
-    }
+    for (std::size_t k = 0; k < active.p.size(); ++k)
+      if (active.free[k]) all.push_back({e, axis, difference_step(infos[k], active.p[k])});
   }
   return all;
 }
+
+/// Differences of predictions. There are many effects with many parameters: for each no more is
+/// worked out than what hangs on it.
+class Differences {
+ public:
+  /// All of these must outlive it. a_g, head: of the model.
+  Differences(const VisitLog& log, const EnlargedParameters& parameters, const Forces& a_g,
+              const std::vector<HeadAtVisit>& head)
+      : log_(log), a_g_(a_g), head_(head), within_dwell_(has_effect_within_dwell(parameters)) {
+    model_.parameters = parameters;
+    for (const ActiveEffect& active : parameters.effects) {
+      model_.numbers.push_back(numbers_of(log, active));
+      remembers_ = remembers_ || active.effect->remembers();
+      if (active.effect->at_converter()) asks_converter_[active.axis] = true;
+    }
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      if (has_effect_on(parameters, axis)) look_at(axis);
+  }
+
+  /// Central difference of the stacked prediction by the free parameter of index `j`. `column`:
+  /// zero. Precondition: the axis that it concerns, if it is one only, has effects.
+  void set_column(Eigen::Index j, const FreeParameter& about,
+                  Eigen::Ref<Eigen::VectorXd> column) const {
+    const Neighbour above = neighbour(j, about, about.step);
+    const Neighbour below = neighbour(j, about, -about.step);
+    if (!about.axis) {
+      set_change_of_all(above, below, column);
+    } else {
+      const std::size_t axis = *about.axis;
+      const auto n = std::ssize(a_g_), row = static_cast<Eigen::Index>(axis) * n;
+      // What the converter makes of its input, it does so in units of the axis's own sensitivity.
+      const bool is_own = j == static_cast<Eigen::Index>(4 * axis + axis);
+      column.segment(row, n) = about.effect ? change_by_effect_V(*about.effect, above, below)
+                               : is_own && asks_converter_[axis]
+                                   ? means_V(above, axis) - means_V(below, axis)
+                                   : change_of_output_V(axis, above, below);
+      if (within_dwell_) set_change_of_dwells(axis, above, below, column);
+    }
+    column /= 2 * about.step;
+  }
+
+ private:
+  struct Neighbour {
+    EnlargedParameters parameters;
+    VisitNumbers numbers;
+  };
+
+  void look_at(std::size_t axis) {
+    constexpr double kStep_V = 1e-6;
+    const auto n = std::ssize(a_g_);
+    passed_on_[axis] = Eigen::VectorXd::Ones(n);
+    for (Eigen::Index row = 0; row < n; ++row) {
+      const auto k = static_cast<std::size_t>(row);
+      const TermInput given = term_input(log_, model_.parameters, model_.numbers, axis, a_g_, k);
+      inputs_[axis].push_back(given);
+      if (!asks_converter_[axis]) continue;
+      const auto made_V = [&](double by_V) {
+        TermInput other = given;
+        other.output_V += by_V;
+        return terms_V(model_.parameters, model_.numbers, other, true);
+      };
+      passed_on_[axis](row) += (made_V(kStep_V) - made_V(-kStep_V)) / (2 * kStep_V);
+    }
+  }
+
+  Neighbour neighbour(Eigen::Index j, const FreeParameter& about, double by) const {
+    Neighbour other = model_;
+    Eigen::VectorXd values = model_.parameters.free_values();
+    values(j) += by;
+    other.parameters.set_free_values(values);
+    if (about.effect)
+      other.numbers[*about.effect] = numbers_of(log_, other.parameters.effects[*about.effect]);
+    return other;
+  }
+
+  Eigen::VectorXd means_V(const Neighbour& model, std::size_t axis) const {
+    return means_of_axis_V(log_, model.parameters, model.numbers, axis, a_g_);
+  }
+
+  /// Of the means, where only one effect of the sensor differs.
+  Eigen::VectorXd change_by_effect_V(std::size_t effect, const Neighbour& above,
+                                     const Neighbour& below) const {
+    const ActiveEffect& active = model_.parameters.effects[effect];
+    Eigen::VectorXd change_V(std::ssize(a_g_));
+    for (const TermInput& input : inputs_[active.axis])
+      change_V(static_cast<Eigen::Index>(input.visit)) =
+          term_V(above.parameters.effects[effect], above.numbers[effect], input) -
+          term_V(below.parameters.effects[effect], below.numbers[effect], input);
+    if (!active.effect->at_converter()) change_V.array() *= passed_on_[active.axis].array();
+    return change_V;
+  }
+
+  /// Of the means, where only what comes before the converter differs.
+  Eigen::VectorXd change_of_output_V(std::size_t axis, const Neighbour& above,
+                                     const Neighbour& below) const {
+    Eigen::VectorXd change_V(std::ssize(a_g_));
+    for (Eigen::Index row = 0; row < change_V.size(); ++row) {
+      const auto k = static_cast<std::size_t>(row);
+      change_V(row) = term_input(log_, above.parameters, above.numbers, axis, a_g_, k).output_V -
+                      term_input(log_, below.parameters, below.numbers, axis, a_g_, k).output_V;
+    }
+    return change_V.cwiseProduct(passed_on_[axis]);
+  }
+
+  /// What belongs to one axis leaves the head, and so the forces, as they are.
+  void set_change_of_dwells(std::size_t axis, const Neighbour& above, const Neighbour& below,
+                            Eigen::Ref<Eigen::VectorXd> change) const {
+    const Eigen::Index rows = log_.dwell_contrasts() * std::ssize(a_g_);
+    change.segment(mean_rows(log_) + static_cast<Eigen::Index>(axis) * rows, rows) =
+        (dwells_of_axis_V(log_, above.parameters, axis, a_g_, head_) -
+         dwells_of_axis_V(log_, below.parameters, axis, a_g_, head_))
+            .reshaped();
+  }
+
+  void set_change_of_all(const Neighbour& above, const Neighbour& below,
+                         Eigen::Ref<Eigen::VectorXd> change) const {
+    const Eigen::Index n = std::ssize(a_g_);
+    Forces above_g = a_g_, below_g = a_g_;
+    std::vector<std::size_t> moved;
+    for (std::size_t k = 0; k < a_g_.size(); ++k) {
+      const HeadGeometry up = head_geometry(log_, above.parameters, above.numbers, k);
+      const HeadGeometry down = head_geometry(log_, below.parameters, below.numbers, k);
+      if (!remembers_ && up == down) continue;
+      moved.push_back(k);
+      above_g[k] = specific_force_g(up, log_.gamma);
+      below_g[k] = specific_force_g(down, log_.gamma);
+    }
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      for (const std::size_t k : moved)
+        change(static_cast<Eigen::Index>(axis) * n + static_cast<Eigen::Index>(k)) =
+            mean_V(log_, above.parameters, above.numbers, axis, above_g, k) -
+            mean_V(log_, below.parameters, below.numbers, axis, below_g, k);
+    if (!within_dwell_) return;
+    const auto above_V = dwells_V(log_, above.parameters, above_g);
+    const auto below_V = dwells_V(log_, below.parameters, below_g);
+    const Eigen::Index rows = log_.dwell_contrasts() * n;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      change.segment(mean_rows(log_) + static_cast<Eigen::Index>(axis) * rows, rows) =
+          (above_V[axis] - below_V[axis]).reshaped();
+  }
+
+  const VisitLog& log_;
+  const Forces& a_g_;
+  const std::vector<HeadAtVisit>& head_;
+  Neighbour model_;
+  // Where an axis has effects, at each visit:
+  PerAxis<std::vector<TermInput>> inputs_;
+  PerAxis<Eigen::VectorXd> passed_on_;  ///< of a change of what the converter is given, as a ratio
+  PerAxis<bool> asks_converter_{};      ///< whether terms of the axis hang on its output
+  bool within_dwell_;
+  bool remembers_ = false;  ///< whether a term hangs on the forces of other visits
+};
 
 /// Writes the columns of the twelve of an axis without effects of the sensor: the readings are
 /// linear in them.
@@ -344,6 +438,7 @@ void set_linear_columns(const Forces& a_g, const std::vector<HeadAtVisit>& head,
     auto column = jacobian.col(4 * i + component);
     for (Eigen::Index k = 0; k < n; ++k)
       column(i * n + k) = component < 3 ? a_g[static_cast<std::size_t>(k)](component) : 1;
+    if (head.empty()) continue;
     auto dwells = column.segment((kAxes + i * contrasts) * n, contrasts * n).reshaped(n, contrasts);
     for (const auto& [visit, course] : head)
       dwells.row(visit) += course.contrasts_V(Eigen::Vector4d::Unit(component));
@@ -351,6 +446,18 @@ void set_linear_columns(const Forces& a_g, const std::vector<HeadAtVisit>& head,
 }
 
 }  // namespace
+
+bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other) {
+  for (std::size_t e = 0; e < one.effects.size(); ++e) {
+    const ActiveEffect& active = one.effects[e];
+    const auto infos = active.effect->parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k)
+      if (active.free[k] && infos[k].role == ParameterRole::shape &&
+          std::abs(active.p[k] - other.effects[e].p[k]) > difference_step(infos[k], active.p[k]))
+        return true;
+  }
+  return false;
+}
 
 Eigen::VectorXd stacked_V(const Observations& observed) {
   return stacked(observed.mean_V, observed.dwell_V);
@@ -362,47 +469,22 @@ Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters&
 }
 
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters) {
-  const Eigen::VectorXd centre = parameters.free_values();
   const std::vector<FreeParameter> free = free_parameters(parameters);
   const Forces a_g = specific_forces_g(log, parameters);
   const std::vector<HeadAtVisit> head = head_courses(log, parameters);
-  const Eigen::Index n = std::ssize(a_g), contrasts = log.dwell_contrasts();
-  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(stacked_rows(log), centre.size());
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(moved_rows(log, parameters), std::ssize(free));
   PerAxis<bool> is_linear;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     is_linear[axis] = !has_effect_on(parameters, axis);
-    if (is_linear[axis]) set_linear_columns(a_g, head, contrasts, axis, jacobian);
+    if (is_linear[axis]) set_linear_columns(a_g, head, log.dwell_contrasts(), axis, jacobian);
   }
   std::vector<std::size_t> others;
   for (std::size_t j = 0; j < free.size(); ++j)
     if (!free[j].axis || !is_linear[*free[j].axis]) others.push_back(j);
+  const Differences differences(log, parameters, a_g, head);
   parallel_for(others.size(), [&](std::size_t c) {
     const auto j = static_cast<Eigen::Index>(others[c]);
-    const auto& [only_axis, step] = free[others[c]];
-    const auto moved = [&](double by) {
-      EnlargedParameters other = parameters;
-      Eigen::VectorXd values = centre;
-      values(j) += by;
-      other.set_free_values(values);
-      return other;
-    };
-    const EnlargedParameters above = moved(step), below = moved(-step);
-    if (!only_axis) {
-      jacobian.col(j) =
-          (predict_stacked_V(log, above) - predict_stacked_V(log, below)) / (2 * step);
-      return;
-    }
-    // What belongs to one axis leaves the head, and so the forces, as they are.
-    const std::size_t axis = *only_axis;
-    const auto i = static_cast<Eigen::Index>(axis);
-    jacobian.col(j).segment(i * n, n) =
-        (means_of_axis_V(log, above, axis, a_g) - means_of_axis_V(log, below, axis, a_g)) /
-        (2 * step);
-    jacobian.col(j).segment((kAxes + i * contrasts) * n, contrasts * n) =
-        (dwells_of_axis_V(log, above, axis, a_g, head) -
-         dwells_of_axis_V(log, below, axis, a_g, head))
-            .reshaped() /
-        (2 * step);
+    differences.set_column(j, free[others[c]], jacobian.col(j));
   });
   return jacobian;
 }

@@ -6,46 +6,10 @@
 #include <vector>
 
 #include "estimator/calibrate.h"
+#include "estimator/diagnosis/enlarged_parameters.h"
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
-
-/// An effect that takes part in the model.
-struct ActiveEffect {
-  const Effect* effect = nullptr;
-  std::size_t axis = 0;    ///< of a sensor effect
-  std::vector<double> p;   ///< values, in the order of effect->parameters()
-  std::vector<bool> free;  ///< which of them are estimated
-
-  Eigen::Index free_count() const;
-};
-
-/// Axes whose readings the effect changes: one for a sensor effect, all three for the head.
-std::vector<std::size_t> axes_of(const ActiveEffect& active);
-/// Free are the amplitudes that are not zero and the shapes; indices stay.
-ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis);
-/// The same with its shapes as they are; with all of them free.
-ActiveEffect with_shapes_held(ActiveEffect active);
-ActiveEffect with_shapes_free(ActiveEffect active);
-
-/// All parameters of the enlarged model.
-struct EnlargedParameters {
-  PerAxis<Eigen::Vector4d> twelve{};  ///< [K_ix K_iy K_iz U_i0], V/g and V
-  std::vector<ActiveEffect> effects;
-
-  /// 12 + free effect parameters.
-  Eigen::Index free_count() const;
-  /// Place of the first free parameter of an effect among all of them.
-  Eigen::Index first_free(std::size_t effect) const;
-  Eigen::VectorXd free_values() const;
-  void set_free_values(const Eigen::VectorXd& values);
-  /// m/s² per volt of residual: g_n / K_ii, signed.
-  double mps2_per_V(std::size_t axis) const;
-};
-
-/// Whether any free shape differs by more than the step over which a Jacobian is taken. Both have
-/// the same effects.
-bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other);
 
 /// Head and base at every visit with the model's head effects.
 std::vector<HeadGeometry> head_geometries(const VisitLog& log,
@@ -54,10 +18,6 @@ std::vector<HeadGeometry> head_geometries(const VisitLog& log,
 /// Specific force at every visit with the geometry of the model's head effects, standard g.
 std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
                                                const EnlargedParameters& parameters);
-
-/// The model with one more effect; without that of an index.
-EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active);
-EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect);
 
 /// What a term of an axis may depend on at one visit, beside the effects of the model; `a_g` are
 /// the specific forces of all visits, which must live as long.
@@ -69,13 +29,6 @@ PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedPara
 /// The same under given specific forces, whatever the head effects of the model say of them.
 PerAxis<Eigen::VectorXd> predict_means_V(const VisitLog& log, const EnlargedParameters& parameters,
                                          const std::vector<Eigen::Vector3d>& a_g);
-
-/// Whether the model has effects that change while the head rests: only then are the rows of the
-/// dwells anything but zero.
-bool has_effect_within_dwell(const EnlargedParameters& parameters);
-
-/// Whether the sensor of an axis has effects; without them its readings are linear in the twelve.
-bool has_effect_on(const EnlargedParameters& parameters, std::size_t axis);
 
 /// Predicted contrasts of the dwells, V, n × log.dwell_contrasts() per axis.
 PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
@@ -108,14 +61,20 @@ Observations observe(const MeasurementSet& set, const VisitLog& log);
 /// each contrast of each axis.
 Eigen::Index mean_rows(const VisitLog& log);
 Eigen::Index stacked_rows(const VisitLog& log);
+/// The first of them, those that a model can move: only the means where it has no effects within
+/// the dwell.
+Eigen::Index moved_rows(const VisitLog& log, const EnlargedParameters& parameters);
 
 /// Measured, V.
 Eigen::VectorXd stacked_V(const Observations& observed);
 /// Predicted, V.
 Eigen::VectorXd predict_stacked_V(const VisitLog& log, const EnlargedParameters& parameters);
 
-/// Derivatives of the stacked prediction by the free parameters, by central differences with steps
-/// fitted to each parameter's size.
+/// Derivatives of the moved rows of the stacked prediction by the free parameters, by central
+/// differences with steps fitted to each parameter's size.
 Eigen::MatrixXd prediction_jacobian(const VisitLog& log, const EnlargedParameters& parameters);
+/// Whether any free shape differs by more than the step of these differences. Both have the same
+/// effects.
+bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other);
 
 }  // namespace plumbline

@@ -77,11 +77,7 @@ std::optional<JointEstimate> joint_estimate(const ExplainInput& input, const Sea
     parameters.set_free_values(values);
     JointPrediction prediction{predict_stacked_V(search.log, parameters),
                                prediction_jacobian(search.log, parameters)};
-    if (!within_dwell) {
-      const Eigen::Index rows = mean_rows(search.log);
-      prediction.value_V.conservativeResize(rows);
-      prediction.slope.conservativeResize(rows, Eigen::NoChange);
-    }
+    prediction.value_V.conservativeResize(prediction.slope.rows());
     return prediction;
   };
   JointFilterOptions options;

@@ -100,14 +100,57 @@ TEST_F(EveryEffect, JacobianAgreesWithTheChangeThatAStepMakes) {
       if (infos[k].role == ParameterRole::amplitude) {
         EnlargedParameters doubled = model;
         doubled.effects[0].p[k] *= 2;
-        const Eigen::VectorXd change =
+        const Eigen::VectorXd stacked =
             stacked_prediction(log, doubled) - stacked_prediction(log, model);
-        ASSERT_EQ(change.size(), jacobian.rows());
+        const Eigen::VectorXd change = stacked.head(jacobian.rows());
+        EXPECT_EQ(change.squaredNorm(), stacked.squaredNorm()) << effect->id();
         const Eigen::VectorXd expected = model.effects[0].p[k] * jacobian.col(column);
         EXPECT_LT((change - expected).norm(), 0.02 * expected.norm() + 1e-12)
             << effect->id() << " " << infos[k].name;
       }
       ++column;
+    }
+  }
+}
+
+// Whatever stands beside it: what an effect before the converter does, a step of the code passes
+// on; what moves the head moves what the sensor remembers.
+TEST_F(EveryEffect, JacobianBesideOthersIsThatOfWholePredictions) {
+  const auto with = [&](const char* id, std::size_t axis, const std::vector<double>& p) {
+    const auto found = std::find_if(all.begin(), all.end(),
+                                    [&](const Effect* effect) { return effect->id() == id; });
+    return activate(**found, axis, {p});
+  };
+  const std::vector<ActiveEffect> others = {
+      with("adc.code_step", 0, {2e-4, -2.58}), with("sensor.drift", 0, {1e-3}),
+      with("rig.delta_eccentricity", 0, {0.02, -0.03}), with("rig.h_scale", 0, {1e-4})};
+  for (const Effect* effect : all) {
+    const auto hypotheses = effect->hypotheses(log, 0);
+    if (hypotheses.empty()) continue;
+    EnlargedParameters model = twelve();
+    model.effects.push_back(activate(*effect, 0, hypotheses[hypotheses.size() / 2]));
+    for (const ActiveEffect& other : others)
+      if (other.effect != effect) model.effects.push_back(other);
+    const Eigen::MatrixXd jacobian = prediction_jacobian(log, model);
+    const Eigen::VectorXd values = model.free_values();
+    std::vector<double> own_step(12, 0);  // of those that hang on the readings about them
+    for (const ActiveEffect& active : model.effects)
+      for (std::size_t k = 0; k < active.p.size(); ++k)
+        if (active.free[k]) own_step.push_back(active.effect->parameters()[k].step);
+    for (Eigen::Index j = 0; j < values.size(); ++j) {
+      const double own = own_step.at(static_cast<std::size_t>(j));
+      const double step = own > 0  ? own
+                          : j < 12 ? 1e-6
+                                   : std::max(1e-3 * std::abs(values(j)), 1e-6);
+      const auto moved = [&](double by) {
+        EnlargedParameters other = model;
+        other.set_free_values(values + by * Eigen::VectorXd::Unit(values.size(), j));
+        return stacked_prediction(log, other);
+      };
+      const Eigen::VectorXd expected =
+          (moved(step) - moved(-step)).head(jacobian.rows()) / (2 * step);
+      EXPECT_LT((jacobian.col(j) - expected).norm(), 1e-3 * expected.norm() + 1e-9)
+          << effect->id() << ", column " << j;
     }
   }
 }
