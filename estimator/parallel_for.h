@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -40,13 +41,15 @@ inline std::size_t usable_cores() {
 /// throw.
 template <class Work>
 void parallel_for(std::size_t count, const Work& work) {
-  std::atomic<std::size_t> next = 0;
-  const auto run = [&] {
-    for (std::size_t i = next++; i < count; i = next++) work(i);
-  };
   const std::size_t cores = SerialScope::active() ? 1 : usable_cores();
   // Three like tasks end sooner when two cores share them than when one core has the third alone.
   const std::size_t threads = count < 2 * cores ? count : cores;
+  std::atomic<std::size_t> next = 0;
+  const auto run = [&] {
+    std::optional<SerialScope> busy;  // as all cores are
+    if (count >= 2 * cores) busy.emplace();
+    for (std::size_t i = next++; i < count; i = next++) work(i);
+  };
   std::vector<std::jthread> helpers;
   for (std::size_t i = 1; i < threads; ++i) helpers.emplace_back(run);
   run();

@@ -107,6 +107,7 @@ std::vector<Scored> worth_refining(const CandidateList& list, const std::vector<
 std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const CandidateResponses& responses,
                                               const std::vector<std::size_t>& subset) {
+  constexpr double kMayGain = 2, kOthersMayGain = 60;  // more than to first order, in χ²
   std::vector<SearchModel::Entry> exchanges;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return exchanges;
@@ -124,11 +125,15 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
         candidate.hypothesis.p == replaced.hypothesis.p)
       continue;
     if (model.is_chosen_beside(subset, candidate)) continue;
-    const EnlargedFit with =
-        model.fit_with(gains, index, candidate, first_order(static_cast<Eigen::Index>(index)));
+    const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
+    const double promised = first_order(static_cast<Eigen::Index>(index));
+    if (chi2_beside(model, candidate, without) - kMayGain * promised - kOthersMayGain +
+            model.price(index) >
+        now)
+      continue;
+    const EnlargedFit with = model.fit_with(gains, index, candidate, promised);
     if (!with.determined) continue;
     const double cost = chi2_beside(model, candidate, with) + model.price_in(with, index);
-    const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
     if (!(cost < now - kWorthExchanging)) continue;
     const double p = model.p_of(candidate, model.log_p_of(index, without, with, gains.dof(index)));
     if (p <= model.false_alarm(candidate)) exchanges.push_back({index, p, with.parameters});
@@ -437,19 +442,22 @@ bool name_unlisted(SearchModel& model) {
   const std::vector<std::vector<std::size_t>> subsets = unlisted_of(model);
   if (subsets.empty()) return false;
   const CandidateResponses& responses = model.responses();
-  for (std::size_t k = 0; k < model.size(); ++k) {
-    if (model.candidate(k).has_name()) continue;
-    const std::vector<SearchModel::Entry> parts = parts_with_names(model, responses, k);
-    if (!parts.empty() &&
-        exchange_in_own_noise(model, {k}, parts, static_cast<double>(parts.size() - 1)))
+  std::vector<std::vector<SearchModel::Entry>> parts(model.size()), names(subsets.size());
+  parallel_for(parts.size(), [&](std::size_t k) {
+    if (!model.candidate(k).has_name()) parts[k] = parts_with_names(model, responses, k);
+  });
+  for (std::size_t k = 0; k < parts.size(); ++k)
+    if (!parts[k].empty() &&
+        exchange_in_own_noise(model, {k}, parts[k], static_cast<double>(parts[k].size() - 1)))
       return true;
-  }
   const Some named =
       candidates_that(model, [](const Candidate& candidate) { return candidate.has_name(); });
-  for (const auto& subset : subsets) {
-    const std::vector<SearchModel::Entry> names = names_for(model, named, subset);
-    const auto more = static_cast<double>(std::max(names.size(), subset.size()) - subset.size());
-    if (!names.empty() && exchange_in_own_noise(model, subset, names, more)) return true;
+  parallel_for(subsets.size(),
+               [&](std::size_t s) { names[s] = names_for(model, named, subsets[s]); });
+  for (std::size_t s = 0; s < subsets.size(); ++s) {
+    const std::size_t now = subsets[s].size();
+    const auto more = static_cast<double>(std::max(names[s].size(), now) - now);
+    if (!names[s].empty() && exchange_in_own_noise(model, subsets[s], names[s], more)) return true;
   }
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& chosen = model.candidate(k);

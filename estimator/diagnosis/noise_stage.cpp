@@ -234,13 +234,18 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     stage.coarse[i] = free.coarse;
     stage.beyond_V2[i] = free.beyond_V2;
     stage.own_V2[i] = input.known_V2[i] + free.variance_V2;
-    stage.whitening.set(i, stage.noise[i].covariance);
   });
   return stage;
 }
 
+void set_whitening(Stage& stage) {
+  parallel_for(kAxisCount,
+               [&](std::size_t i) { stage.whitening.set(i, stage.noise[i].covariance); });
+}
+
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters, const Before& before) {
   Stage stage = settle_noise(input, parameters, before);
+  set_whitening(stage);
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
 }

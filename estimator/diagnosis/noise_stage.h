@@ -34,10 +34,13 @@ struct Before {
 };
 PerAxis<const PooledNoise*> all_of(const PerAxis<PooledNoise>& noise);
 
-/// The noise under given parameters; `fit` stays empty. `beside`: further functions of the visits,
-/// n × any number, that the noise is estimated beside.
+/// The noise under given parameters; `fit` and what whitens the means stay empty. `beside`: further
+/// functions of the visits, n × any number, that the noise is estimated beside.
 Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
                    const Before& before, const Eigen::MatrixXd& beside = {});
+
+/// Whitens the means by the noise of the stage.
+void set_whitening(Stage& stage);
 
 /// The same with the model fitted. Noise and parameters depend on each other only weakly: one round
 /// after the parameters are known settles both.

@@ -411,11 +411,19 @@ void SearchModel::drop_what_excess_explains() {
 }
 
 void SearchModel::drop_superfluous() {
-  for (std::size_t k = chosen_.size(); k-- > 0 && chosen_.size() > 1;) {
-    if (is_certain(candidate(k))) continue;
-    const EnlargedFit without = fit_without({k});
-    if (!without.determined || p_of_removal(k, without) < false_alarm(candidate(k))) continue;
-    drop({k}, without);
+  std::size_t end = chosen_.size();  // those from here on are not, or are gone
+  while (end > 0 && chosen_.size() > 1) {
+    std::vector<std::optional<EnlargedFit>> without(end);
+    parallel_for(end, [&](std::size_t k) {
+      if (!is_certain(candidate(k))) without[k] = fit_without({k});
+    });
+    const auto is_superfluous = [&](std::size_t k) {
+      return without[k] && without[k]->determined &&
+             p_of_removal(k, *without[k]) >= false_alarm(candidate(k));
+    };
+    while (end > 0 && !is_superfluous(end - 1)) --end;
+    if (end > 0) drop({end - 1}, *without[end - 1]);
+    if (end > 0) --end;
   }
 }
 

@@ -90,7 +90,8 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
     PerAxis<Eigen::VectorXd> powers;
     for (std::size_t i = 0; i < kAxisCount; ++i)
       powers[i] = plain[i].power + share * (rich.noise[i].power - plain[i].power);
-    const Stage stage = settle_noise(input, model, {.powers = &powers, .freed = &rich});
+    Stage stage = settle_noise(input, model, {.powers = &powers, .freed = &rich});
+    set_whitening(stage);
     const EnlargedFit fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
     responses = whitened(slow.responses_V, input.log, stage.whitening);
     gains_of.emplace(responses, fit);
