@@ -124,7 +124,10 @@ TEST_F(EveryEffect, JacobianBesideOthersIsThatOfWholePredictions) {
   const std::vector<ActiveEffect> others = {
       with("adc.code_step", 0, {2e-4, -2.58}), with("sensor.drift", 0, {1e-3}),
       with("rig.delta_eccentricity", 0, {0.02, -0.03}), with("rig.h_scale", 0, {1e-4})};
-  for (const Effect* effect : all) {
+  const auto terms = smooth_terms(log, SmoothTermSelection::any);
+  std::vector<const Effect*> with_terms = all;
+  for (const auto& term : terms) with_terms.push_back(term.get());
+  for (const Effect* effect : with_terms) {
     const auto hypotheses = effect->hypotheses(log, 0);
     if (hypotheses.empty()) continue;
     EnlargedParameters model = twelve();
