@@ -312,7 +312,8 @@ class Differences {
                                : is_own && asks_converter_[axis]
                                    ? means_V(above, axis) - means_V(below, axis)
                                    : change_of_output_V(axis, above, below);
-      if (within_dwell_) set_change_of_dwells(axis, above, below, column);
+      if (within_dwell_)
+        set_dwells(axis, dwells_of_V(above, axis) - dwells_of_V(below, axis), column);
     }
     column /= 2 * about.step;
   }
@@ -351,8 +352,12 @@ class Differences {
     return other;
   }
 
+  // What belongs to one axis leaves the head, and so the forces, as they are.
   Eigen::VectorXd means_V(const Neighbour& model, std::size_t axis) const {
     return means_of_axis_V(log_, model.parameters, model.numbers, axis, a_g_);
+  }
+  Eigen::MatrixXd dwells_of_V(const Neighbour& model, std::size_t axis) const {
+    return dwells_of_axis_V(log_, model.parameters, axis, a_g_, head_);
   }
 
   /// Of the means, where only one effect of the sensor differs.
@@ -380,14 +385,11 @@ class Differences {
     return change_V.cwiseProduct(passed_on_[axis]);
   }
 
-  /// What belongs to one axis leaves the head, and so the forces, as they are.
-  void set_change_of_dwells(std::size_t axis, const Neighbour& above, const Neighbour& below,
-                            Eigen::Ref<Eigen::VectorXd> change) const {
-    const Eigen::Index rows = log_.dwell_contrasts() * std::ssize(a_g_);
+  void set_dwells(std::size_t axis, const Eigen::MatrixXd& change_V,
+                  Eigen::Ref<Eigen::VectorXd> change) const {
+    const Eigen::Index rows = change_V.size();
     change.segment(mean_rows(log_) + static_cast<Eigen::Index>(axis) * rows, rows) =
-        (dwells_of_axis_V(log_, above.parameters, axis, a_g_, head_) -
-         dwells_of_axis_V(log_, below.parameters, axis, a_g_, head_))
-            .reshaped();
+        change_V.reshaped();
   }
 
   void set_change_of_all(const Neighbour& above, const Neighbour& below,
@@ -411,10 +413,8 @@ class Differences {
     if (!within_dwell_) return;
     const auto above_V = dwells_V(log_, above.parameters, above_g);
     const auto below_V = dwells_V(log_, below.parameters, below_g);
-    const Eigen::Index rows = log_.dwell_contrasts() * n;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-      change.segment(mean_rows(log_) + static_cast<Eigen::Index>(axis) * rows, rows) =
-          (above_V[axis] - below_V[axis]).reshaped();
+      set_dwells(axis, above_V[axis] - below_V[axis], change);
   }
 
   const VisitLog& log_;

@@ -411,8 +411,8 @@ void SearchModel::drop_what_excess_explains() {
 }
 
 void SearchModel::drop_superfluous() {
-  std::size_t end = chosen_.size();  // those from here on are not, or are gone
-  while (end > 0 && chosen_.size() > 1) {
+  // Those from `end` on are not, or are gone.
+  for (std::size_t end = chosen_.size(); end > 0 && chosen_.size() > 1;) {
     std::vector<std::optional<EnlargedFit>> without(end);
     parallel_for(end, [&](std::size_t k) {
       if (!is_certain(candidate(k))) without[k] = fit_without({k});
@@ -422,8 +422,9 @@ void SearchModel::drop_superfluous() {
              p_of_removal(k, *without[k]) >= false_alarm(candidate(k));
     };
     while (end > 0 && !is_superfluous(end - 1)) --end;
-    if (end > 0) drop({end - 1}, *without[end - 1]);
-    if (end > 0) --end;
+    if (end == 0) return;
+    --end;
+    drop({end}, *without[end]);
   }
 }
 

@@ -8,6 +8,9 @@
 #include <memory>
 #include <numbers>
 #include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "estimator/diagnosis/candidates.h"
 #include "estimator/diagnosis/enlarged_model.h"
@@ -35,6 +38,15 @@ Eigen::VectorXd stacked_prediction(const VisitLog& log, const EnlargedParameters
   all << mean_V[0], mean_V[1], mean_V[2], dwell_V[0].reshaped(), dwell_V[1].reshaped(),
       dwell_V[2].reshaped();
   return all;
+}
+
+// An effect of the catalogue, of the x axis if it is one of the sensor.
+ActiveEffect listed(const std::string& id, const std::vector<double>& p) {
+  const auto& all = effect_catalogue();
+  const auto found = std::find_if(all.begin(), all.end(),
+                                  [&](const Effect* effect) { return effect->id() == id; });
+  if (found == all.end()) throw std::invalid_argument(id);
+  return activate(**found, 0, {p});
 }
 
 struct EveryEffect : testing::Test {
@@ -116,14 +128,9 @@ TEST_F(EveryEffect, JacobianAgreesWithTheChangeThatAStepMakes) {
 // Whatever stands beside it: what an effect before the converter does, a step of the code passes
 // on; what moves the head moves what the sensor remembers.
 TEST_F(EveryEffect, JacobianBesideOthersIsThatOfWholePredictions) {
-  const auto with = [&](const char* id, std::size_t axis, const std::vector<double>& p) {
-    const auto found = std::find_if(all.begin(), all.end(),
-                                    [&](const Effect* effect) { return effect->id() == id; });
-    return activate(**found, axis, {p});
-  };
   const std::vector<ActiveEffect> others = {
-      with("adc.code_step", 0, {2e-4, -2.58}), with("sensor.drift", 0, {1e-3}),
-      with("rig.delta_eccentricity", 0, {0.02, -0.03}), with("rig.h_scale", 0, {1e-4})};
+      listed("adc.code_step", {2e-4, -2.58}), listed("sensor.drift", {1e-3}),
+      listed("rig.delta_eccentricity", {0.02, -0.03}), listed("rig.h_scale", {1e-4})};
   const auto terms = smooth_terms(log, SmoothTermSelection::any);
   std::vector<const Effect*> with_terms = all;
   for (const auto& term : terms) with_terms.push_back(term.get());
@@ -427,13 +434,8 @@ TEST(CodeStep, LiesWhereTheConverterIsGivenItWhateverMakesTheVoltage) {
     return std::vector<double>(bare_V.begin(), bare_V.end());
   }();
   constexpr double at_V = -2.58, step_V = 1e-4, rate_V_per_s = 5e-5;
-  const auto add = [&](const char* id, const std::vector<double>& p) {
-    for (const Effect* effect : effect_catalogue())
-      if (effect->id() == id) model.effects.push_back(activate(*effect, 0, {p}));
-  };
-  add("adc.code_step", {step_V, at_V});
-  add("sensor.drift", {rate_V_per_s * 3600 / model.twelve[0](0)});
-  ASSERT_THAT(model.effects, SizeIs(2));
+  model.effects = {listed("adc.code_step", {step_V, at_V}),
+                   listed("sensor.drift", {rate_V_per_s * 3600 / model.twelve[0](0)})};
   const Eigen::VectorXd with_V = predict_means_V(log, model)[0];
   int moved_over = 0;
   for (std::size_t k = 0; k < log.visits.size(); ++k) {
