@@ -35,8 +35,36 @@ double log_between(const Edge& low, const Edge& high) {
   return -0.5 * nearer * nearer - std::log(nearer) - 0.918938533204672742;
 }
 
+/// log(eᵃ + eᵇ).
+double log_of_sum(double a, double b) {
+  return std::max(a, b) + std::log1p(std::exp(-std::abs(a - b)));
+}
+
+/// Noise of one reading, steps: a share of the readings, zero or a few in a thousand, has noise
+/// that is kWider times as large (Tukey's contaminated normal distribution).
+struct ReadingNoise {
+  double sigma = 0;
+  double contamination = 0;
+};
+/// What recorded sensors show beyond 4 standard deviations (ADIS16405: 3 to 15 readings in 10 000,
+/// and of those every third beyond 5). Where the noise is a tenth of a step, one such reading says
+/// otherwise that the edge of a code is near.
+constexpr double kContamination = 0.005;
+constexpr double kWider = 3;
+/// What contamination must gain of the log evidence: it costs what single readings beyond an edge
+/// say.
+constexpr double kContaminationGain = 4;
+
+double log_between(const Edge& low, const Edge& high, double contamination) {
+  const double clean = log_between(low, high);
+  if (contamination == 0) return clean;
+  return log_of_sum(
+      std::log1p(-contamination) + clean,
+      std::log(contamination) + log_between(edge_at(low.z / kWider), edge_at(high.z / kWider)));
+}
+
 /// log-likelihood of a pose's codes when its true output is u.
-double log_likelihood(const CodeCounts& codes, double u, double sigma) {
+double log_likelihood(const CodeCounts& codes, double u, const ReadingNoise& noise) {
   double sum = 0, last_code = -kInfinity;
   Edge high;
   for (std::size_t i = 0; i < codes.count.size(); ++i) {
@@ -44,10 +72,11 @@ double log_likelihood(const CodeCounts& codes, double u, double sigma) {
     const bool adjacent = code == last_code + 1;  // its boundary is that of the code before
     const Edge low = adjacent                     ? high
                      : codes.at_low_end && i == 0 ? edge_at(-kInfinity)
-                                                  : edge_at((code - 0.5 - u) / sigma);
-    high = codes.at_high_end && i + 1 == codes.count.size() ? edge_at(kInfinity)
-                                                            : edge_at((code + 0.5 - u) / sigma);
-    sum += count * log_between(low, high);
+                                                  : edge_at((code - 0.5 - u) / noise.sigma);
+    high = codes.at_high_end && i + 1 == codes.count.size()
+               ? edge_at(kInfinity)
+               : edge_at((code + 0.5 - u) / noise.sigma);
+    sum += count * log_between(low, high, noise.contamination);
     last_code = code;
   }
   return sum;
@@ -60,13 +89,14 @@ struct TiltedMoments {
   double variance = 0;
 };
 
-TiltedMoments moments_of(const CodeCounts& codes, double sigma, double mean, double variance) {
+TiltedMoments integrate(const CodeCounts& codes, const ReadingNoise& noise, double mean,
+                        double variance) {
   constexpr int kPoints = 32;
   constexpr double kWidth = 6;        // standard deviations
   constexpr double kNegligible = 18;  // in log
   const double sd = std::sqrt(variance);
   // Where both factors can be felt: within the Gaussian, and near the codes that were seen.
-  const double reach = kWidth * sigma;
+  const double reach = kWidth * noise.sigma;
   double low =
       std::max(mean - kWidth * sd, std::min(codes.count.front().first - 0.5 - reach, mean));
   double high =
@@ -80,7 +110,7 @@ TiltedMoments moments_of(const CodeCounts& codes, double sigma, double mean, dou
       const double u = low + step * i;
       const double z = (u - mean) / sd;
       double& value = log_density[static_cast<std::size_t>(i)];
-      value = -0.5 * z * z + log_likelihood(codes, u, sigma);
+      value = -0.5 * z * z + log_likelihood(codes, u, noise);
       top = std::max(top, value);
     }
     int first = 0, last = kPoints;
@@ -106,6 +136,37 @@ TiltedMoments moments_of(const CodeCounts& codes, double sigma, double mean, dou
           std::max(second_moment / mass - shift * shift, 1e-12 * variance)};
 }
 
+/// What is left of the readings off the most frequent code: each with the probability that it is
+/// not one of those with wider noise.
+CodeCounts without_contamination(CodeCounts codes, const ReadingNoise& noise, double mean,
+                                 double variance) {
+  const double sd = std::sqrt(noise.sigma * noise.sigma + variance);
+  const auto most =
+      std::max_element(codes.count.begin(), codes.count.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
+  for (auto it = codes.count.begin(); it != codes.count.end(); ++it) {
+    if (it == most) continue;
+    const Edge low = edge_at((it->first - 0.5 - mean) / sd);
+    const Edge high = edge_at((it->first + 0.5 - mean) / sd);
+    it->second *= std::exp(std::log1p(-noise.contamination) + log_between(low, high) -
+                           log_between(low, high, noise.contamination));
+  }
+  return codes;
+}
+
+/// With contamination the likelihood is no longer concave in log, as Gaussian sites need it: the
+/// moments are those that remain without the contamination expected at the prior.
+TiltedMoments moments_of(const CodeCounts& codes, const ReadingNoise& noise, double mean,
+                         double variance) {
+  TiltedMoments moments = integrate(codes, noise, mean, variance);
+  if (noise.contamination == 0 || codes.count.size() < 2) return moments;
+  const double log_mass = moments.log_mass;
+  moments = integrate(without_contamination(codes, noise, mean, variance), {noise.sigma, 0}, mean,
+                      variance);
+  moments.log_mass = log_mass;
+  return moments;
+}
+
 /// Expectation propagation at given sigma and scatter.
 class Propagation {
  public:
@@ -124,12 +185,12 @@ class Propagation {
   }
 
   /// Evidence (log, but for a constant). Starts from the sites as they are.
-  double run(double sigma, double scatter, int most_sweeps) {
+  double run(const ReadingNoise& noise, double scatter, int most_sweeps) {
     double evidence = -kInfinity;
     converged = false;
     for (int sweep = 0; sweep < most_sweeps && !converged; ++sweep) {
       const double last = evidence;
-      evidence = sweep_once(sigma, scatter * scatter, sweep == 0 ? 1.0 : 0.8);
+      evidence = sweep_once(noise, scatter * scatter, sweep == 0 ? 1.0 : 0.8);
       converged = std::abs(evidence - last) < 2e-3;
     }
     return evidence;
@@ -149,7 +210,7 @@ class Propagation {
   bool converged = false;
 
  private:
-  double sweep_once(double sigma, double scatter2, double damping) {
+  double sweep_once(const ReadingNoise& noise, double scatter2, double damping) {
     solve();
     double evidence = 0.5 * std::log(covariance.determinant());
     for (Eigen::Index k = 0; k < A_.rows(); ++k) {
@@ -161,7 +222,7 @@ class Propagation {
       const double cavity_mean = cavity_variance * (mean / variance - shift_(k));
       const double total = cavity_variance + known_variance_(k) + scatter2;
       const TiltedMoments tilted =
-          moments_of(codes_[static_cast<std::size_t>(k)], sigma, known_(k) + cavity_mean, total);
+          moments_of(codes_[static_cast<std::size_t>(k)], noise, known_(k) + cavity_mean, total);
       // The old site as it stands in the evidence …
       const double old_variance = 1 / precision_(k), old_mean = shift_(k) / precision_(k);
       const double spread = cavity_variance + old_variance;
@@ -272,8 +333,9 @@ IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts
   // Pattern search over both logarithms; with single readings they cannot be told apart.
   Propagation search(A, codes, known_variance, known);
   std::array<double, 2> at = {std::log(guess.sigma), std::log(kLeastScatter)};
+  double contamination = 0;
   const auto evidence_of = [&](const std::array<double, 2>& x) {
-    return search.run(std::exp(x[0]), std::exp(x[1]), kSearchSweeps);
+    return search.run({std::exp(x[0]), contamination}, std::exp(x[1]), kSearchSweeps);
   };
   double best = evidence_of(at);
   int evaluations = 1;
@@ -309,14 +371,26 @@ IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts
     at[1] = std::log(guess.scatter);
     best = evidence_of(at);
     climb(2, 0.8);
-    if (best < evidence_without + kScatterGain) at = without;
+    if (best < evidence_without + kScatterGain) {
+      at = without;
+      best = evidence_without;
+    }
+    const std::array<double, 2> clean = at;
+    const double evidence_clean = best;
+    contamination = kContamination;
+    best = evidence_of(at);
+    if (best > evidence_clean) climb(2, 0.8);
+    if (best < evidence_clean + kContaminationGain) {
+      at = clean;
+      contamination = 0;
+    }
   }
 
   IntervalFit fit;
   fit.sigma = std::exp(at[0]);
   fit.scatter = std::exp(at[1]);
   search.reset();
-  search.run(fit.sigma, fit.scatter, kFinalSweeps);
+  search.run({fit.sigma, contamination}, fit.scatter, kFinalSweeps);
   search.solve();
   fit.converged = search.converged && search.value.allFinite() && search.covariance.allFinite();
   fit.value = search.value;
@@ -331,27 +405,38 @@ CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCou
   // Steps; from far off a site is the step's whole width.
   constexpr std::array<double, 9> kOff = {0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5, 15, 50};
   constexpr double kMostVariance = 1;
-  const Eigen::Index n = expected.size();
-  CodeSites best;
-  double best_evidence = -kInfinity;
-  for (const double off : kOff) {
-    CodeSites sites{Eigen::VectorXd(n), Eigen::VectorXd(n)};
-    double evidence = 0;
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const TiltedMoments tilted =
-          moments_of(codes[static_cast<std::size_t>(k)], sigma, expected(k), off * off);
-      evidence += tilted.log_mass;
+  struct Weighed {
+    CodeSites sites;
+    double evidence = -kInfinity;
+    double off = 0;
+  };
+  const auto sites_with = [&](double off, double contamination) {
+    Weighed at{{Eigen::VectorXd(expected.size()), Eigen::VectorXd(expected.size())}, 0, off};
+    for (Eigen::Index k = 0; k < expected.size(); ++k) {
+      const TiltedMoments tilted = moments_of(codes[static_cast<std::size_t>(k)],
+                                              {sigma, contamination}, expected(k), off * off);
+      at.evidence += tilted.log_mass;
       const double precision = std::max(1 / tilted.variance - 1 / (off * off), 1 / kMostVariance);
       // That the expectation and the site together have the mean that they have with the codes.
-      sites.mean(k) = tilted.mean + (tilted.mean - expected(k)) / (off * off * precision);
-      sites.variance(k) = 1 / precision;
+      at.sites.mean(k) = tilted.mean + (tilted.mean - expected(k)) / (off * off * precision);
+      at.sites.variance(k) = 1 / precision;
     }
-    if (best.mean.size() == 0 || evidence > best_evidence) {
-      best_evidence = evidence;
-      best = std::move(sites);
-    }
+    return at;
+  };
+  Weighed best;
+  for (const double off : kOff)
+    if (Weighed at = sites_with(off, 0); at.evidence > best.evidence) best = std::move(at);
+  // A reading that noise alone would not carry over an edge makes all seem further off.
+  const double furthest = best.off;
+  double to_beat = best.evidence + kContaminationGain;
+  for (const double off : kOff) {
+    if (off > furthest) break;
+    Weighed at = sites_with(off, kContamination);
+    if (!(at.evidence > to_beat)) continue;
+    to_beat = at.evidence;
+    best = std::move(at);
   }
-  return best;
+  return std::move(best.sites);
 }
 
 }  // namespace plumbline

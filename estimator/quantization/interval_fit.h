@@ -51,9 +51,12 @@ struct IntervalFit {
 
 /// Parameters x of A·x (n × 4) given codes. Each pose's true output is known + A·x + e, e ~ N(0,
 /// known_variance + scatter²) (positioning, model error: this is what keeps the intervals soft);
-/// each reading adds N(0, sigma²) and is rounded. The posterior under a flat prior is approximated
-/// by expectation propagation (Minka 2001): moments of one pose's exact likelihood at a time; sigma
-/// and scatter maximise the evidence. Preconditions: A has full rank, n > 4.
+/// each reading adds N(0, sigma²) and is rounded; where that is clearly likelier, one in 200
+/// readings adds N(0, 9 sigma²) instead (the contaminated normal distribution, Tukey 1960), as
+/// recorded sensors do, so that a single reading beyond an edge says little. The posterior under a
+/// flat prior is approximated by expectation propagation (Minka 2001): moments of one pose's exact
+/// likelihood at a time; sigma and scatter maximise the evidence. Preconditions: A has full rank, n
+/// > 4.
 IntervalFit fit_intervals(const Eigen::MatrixXd& A, const std::vector<CodeCounts>& codes,
                           const Eigen::VectorXd& known_variance, const Eigen::VectorXd& known);
 
@@ -65,7 +68,8 @@ struct CodeSites {
 };
 
 /// Where each output is expected at `expected`, independently of the others. How far off that is
-/// maximises the evidence. Variances are at most 1.
+/// maximises the evidence, as does whether readings are contaminated as in fit_intervals().
+/// Variances are at most 1.
 CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCounts>& codes,
                       double sigma);
 
