@@ -53,7 +53,9 @@ constexpr double kContamination = 0.005;
 constexpr double kWider = 3;
 /// What contamination must gain of the log evidence: it costs what single readings beyond an edge
 /// say.
-constexpr double kContaminationGain = 4;
+constexpr double kContaminationGain = 6;
+/// Of the readings of a pose, off the most frequent code: where more are, it is not by accident.
+constexpr double kMostOff = 0.05;
 
 double log_between(const Edge& low, const Edge& high, double contamination) {
   const double clean = log_between(low, high);
@@ -136,20 +138,24 @@ TiltedMoments integrate(const CodeCounts& codes, const ReadingNoise& noise, doub
           std::max(second_moment / mass - shift * shift, 1e-12 * variance)};
 }
 
+/// How many readings are on the most frequent code.
+double most_frequent(const CodeCounts& codes) {
+  double most = 0;
+  for (const auto& [code, count] : codes.count) most = std::max(most, count);
+  return most;
+}
+
 /// What is left of the readings off the most frequent code: each with the probability that it is
 /// not one of those with wider noise.
 CodeCounts without_contamination(CodeCounts codes, const ReadingNoise& noise, double mean,
                                  double variance) {
   const double sd = std::sqrt(noise.sigma * noise.sigma + variance);
-  const auto most =
-      std::max_element(codes.count.begin(), codes.count.end(),
-                       [](const auto& a, const auto& b) { return a.second < b.second; });
-  for (auto it = codes.count.begin(); it != codes.count.end(); ++it) {
-    if (it == most) continue;
-    const Edge low = edge_at((it->first - 0.5 - mean) / sd);
-    const Edge high = edge_at((it->first + 0.5 - mean) / sd);
-    it->second *= std::exp(std::log1p(-noise.contamination) + log_between(low, high) -
-                           log_between(low, high, noise.contamination));
+  const double most = most_frequent(codes);
+  for (auto& [code, count] : codes.count) {
+    if (count == most) continue;
+    const Edge low = edge_at((code - 0.5 - mean) / sd), high = edge_at((code + 0.5 - mean) / sd);
+    count *= std::exp(std::log1p(-noise.contamination) + log_between(low, high) -
+                      log_between(low, high, noise.contamination));
   }
   return codes;
 }
@@ -158,12 +164,16 @@ CodeCounts without_contamination(CodeCounts codes, const ReadingNoise& noise, do
 /// moments are those that remain without the contamination expected at the prior.
 TiltedMoments moments_of(const CodeCounts& codes, const ReadingNoise& noise, double mean,
                          double variance) {
-  TiltedMoments moments = integrate(codes, noise, mean, variance);
-  if (noise.contamination == 0 || codes.count.size() < 2) return moments;
-  const double log_mass = moments.log_mass;
-  moments = integrate(without_contamination(codes, noise, mean, variance), {noise.sigma, 0}, mean,
-                      variance);
-  moments.log_mass = log_mass;
+  const ReadingNoise clean{noise.sigma, 0};
+  if (noise.contamination == 0 || codes.count.size() < 2)
+    return integrate(codes, clean, mean, variance);
+  double readings = 0;
+  for (const auto& [code, count] : codes.count) readings += count;
+  if (readings - most_frequent(codes) > kMostOff * readings)
+    return integrate(codes, clean, mean, variance);
+  TiltedMoments moments =
+      integrate(without_contamination(codes, noise, mean, variance), clean, mean, variance);
+  moments.log_mass = integrate(codes, noise, mean, variance).log_mass;
   return moments;
 }
 

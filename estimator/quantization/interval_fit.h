@@ -53,7 +53,8 @@ struct IntervalFit {
 /// known_variance + scatter²) (positioning, model error: this is what keeps the intervals soft);
 /// each reading adds N(0, sigma²) and is rounded; where that is clearly likelier, one in 200
 /// readings adds N(0, 9 sigma²) instead (the contaminated normal distribution, Tukey 1960), as
-/// recorded sensors do, so that a single reading beyond an edge says little. The posterior under a
+/// recorded sensors do, so that a single reading beyond an edge says little; not in poses of which
+/// more than one reading in 20 is off the most frequent code. The posterior under a
 /// flat prior is approximated by expectation propagation (Minka 2001): moments of one pose's exact
 /// likelihood at a time; sigma and scatter maximise the evidence. Preconditions: A has full rank, n
 /// > 4.

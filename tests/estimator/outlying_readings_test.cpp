@@ -104,23 +104,5 @@ TEST(OutlyingReadings, OfARecordAreFoundInAWalk) {
   EXPECT_THAT(rows(outlying_readings(record)), testing::ElementsAre(1234));
 }
 
-// Noise of a tenth of a step, and one reading in 400 seven standard deviations off, less than a
-// step. One over the edge of a code says nothing of where its pose is.
-TEST(OutlyingReadings, OverTheEdgeOfACodeAreNoEffect) {
-  SyntheticOptions options;
-  options.sigma_V = 0.11 * kTwelveBits.lsb_V();
-  options.samples_per_pose = 40;
-  options.delta_step_deg = options.h_step_deg = 10;
-  options.more_V[1] = [&](const std::array<double, 3>&, double t_s) {
-    const auto reading = std::llround(100 * t_s);
-    return reading % 401 == 0 ? (reading % 2 == 0 ? 7 : -7) * options.sigma_V : 0;
-  };
-  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
-    const Diagnosis found = calibrated(synthetic_run(seed, kTwelveBits, options)).diagnosis;
-    EXPECT_TRUE(found.effects.empty()) << "seed " << seed;
-    EXPECT_EQ(found.verdict, Verdict::clean) << "seed " << seed;
-  }
-}
-
 }  // namespace
 }  // namespace plumbline
