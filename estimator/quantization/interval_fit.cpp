@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -138,11 +139,23 @@ TiltedMoments integrate(const CodeCounts& codes, const ReadingNoise& noise, doub
           std::max(second_moment / mass - shift * shift, 1e-12 * variance)};
 }
 
-/// How many readings are on the most frequent code.
-double most_frequent(const CodeCounts& codes) {
-  double most = 0;
-  for (const auto& [code, count] : codes.count) most = std::max(most, count);
-  return most;
+/// Readings on the most frequent code, and in all.
+struct Agreement {
+  double most = 0, readings = 0;
+};
+Agreement agreement_of(const CodeCounts& codes) {
+  Agreement agreement;
+  for (const auto& [code, count] : codes.count) {
+    agreement.most = std::max(agreement.most, count);
+    agreement.readings += count;
+  }
+  return agreement;
+}
+
+/// Whether readings of the pose may be of those with wider noise: some, but few do not agree.
+bool may_be_contaminated(const CodeCounts& codes) {
+  const auto [most, readings] = agreement_of(codes);
+  return most < readings && readings - most <= kMostOff * readings;
 }
 
 /// What is left of the readings off the most frequent code: each with the probability that it is
@@ -150,7 +163,7 @@ double most_frequent(const CodeCounts& codes) {
 CodeCounts without_contamination(CodeCounts codes, const ReadingNoise& noise, double mean,
                                  double variance) {
   const double sd = std::sqrt(noise.sigma * noise.sigma + variance);
-  const double most = most_frequent(codes);
+  const double most = agreement_of(codes).most;
   for (auto& [code, count] : codes.count) {
     if (count == most) continue;
     const Edge low = edge_at((code - 0.5 - mean) / sd), high = edge_at((code + 0.5 - mean) / sd);
@@ -165,11 +178,7 @@ CodeCounts without_contamination(CodeCounts codes, const ReadingNoise& noise, do
 TiltedMoments moments_of(const CodeCounts& codes, const ReadingNoise& noise, double mean,
                          double variance) {
   const ReadingNoise clean{noise.sigma, 0};
-  if (noise.contamination == 0 || codes.count.size() < 2)
-    return integrate(codes, clean, mean, variance);
-  double readings = 0;
-  for (const auto& [code, count] : codes.count) readings += count;
-  if (readings - most_frequent(codes) > kMostOff * readings)
+  if (noise.contamination == 0 || !may_be_contaminated(codes))
     return integrate(codes, clean, mean, variance);
   TiltedMoments moments =
       integrate(without_contamination(codes, noise, mean, variance), clean, mean, variance);
@@ -417,36 +426,42 @@ CodeSites sites_about(const Eigen::VectorXd& expected, const std::vector<CodeCou
   constexpr double kMostVariance = 1;
   struct Weighed {
     CodeSites sites;
-    double evidence = -kInfinity;
+    Eigen::VectorXd log_mass;
     double off = 0;
+    double evidence() const { return log_mass.sum(); }
   };
-  const auto sites_with = [&](double off, double contamination) {
-    Weighed at{{Eigen::VectorXd(expected.size()), Eigen::VectorXd(expected.size())}, 0, off};
-    for (Eigen::Index k = 0; k < expected.size(); ++k) {
-      const TiltedMoments tilted = moments_of(codes[static_cast<std::size_t>(k)],
-                                              {sigma, contamination}, expected(k), off * off);
-      at.evidence += tilted.log_mass;
-      const double precision = std::max(1 / tilted.variance - 1 / (off * off), 1 / kMostVariance);
-      // That the expectation and the site together have the mean that they have with the codes.
-      at.sites.mean(k) = tilted.mean + (tilted.mean - expected(k)) / (off * off * precision);
-      at.sites.variance(k) = 1 / precision;
-    }
-    return at;
+  const Eigen::Index n = expected.size();
+  const auto set_site = [&](Weighed& at, Eigen::Index k, double contamination) {
+    const double off2 = at.off * at.off;
+    const TiltedMoments tilted =
+        moments_of(codes[static_cast<std::size_t>(k)], {sigma, contamination}, expected(k), off2);
+    at.log_mass(k) = tilted.log_mass;
+    const double precision = std::max(1 / tilted.variance - 1 / off2, 1 / kMostVariance);
+    // That the expectation and the site together have the mean that they have with the codes.
+    at.sites.mean(k) = tilted.mean + (tilted.mean - expected(k)) / (off2 * precision);
+    at.sites.variance(k) = 1 / precision;
   };
-  Weighed best;
-  for (const double off : kOff)
-    if (Weighed at = sites_with(off, 0); at.evidence > best.evidence) best = std::move(at);
-  // A reading that noise alone would not carry over an edge makes all seem further off.
-  const double furthest = best.off;
-  double to_beat = best.evidence + kContaminationGain;
+  std::vector<Weighed> clean;
   for (const double off : kOff) {
-    if (off > furthest) break;
-    Weighed at = sites_with(off, kContamination);
-    if (!(at.evidence > to_beat)) continue;
-    to_beat = at.evidence;
-    best = std::move(at);
+    clean.push_back({{Eigen::VectorXd(n), Eigen::VectorXd(n)}, Eigen::VectorXd(n), off});
+    for (Eigen::Index k = 0; k < n; ++k) set_site(clean.back(), k, 0);
   }
-  return std::move(best.sites);
+  const auto likeliest = std::max_element(
+      clean.begin(), clean.end(),
+      [](const Weighed& a, const Weighed& b) { return a.evidence() < b.evidence(); });
+  CodeSites sites = likeliest->sites;
+  double to_beat = likeliest->evidence() + kContaminationGain;
+  // A reading that noise alone would not carry over an edge makes all seem further off.
+  for (auto it = clean.begin(); it != std::next(likeliest); ++it) {
+    Weighed contaminated = *it;
+    for (Eigen::Index k = 0; k < n; ++k)
+      if (may_be_contaminated(codes[static_cast<std::size_t>(k)]))
+        set_site(contaminated, k, kContamination);
+    if (!(contaminated.evidence() > to_beat)) continue;
+    to_beat = contaminated.evidence();
+    sites = std::move(contaminated.sites);
+  }
+  return sites;
 }
 
 }  // namespace plumbline
