@@ -58,6 +58,29 @@ Result<void> check_responsive(const Calibration& calibration, const std::string&
   return {};
 }
 
+/// Of an output that mostly is beyond what its converter reads, the rest tells nothing.
+Result<void> check_on_scale(const CalibrationJob& job) {
+  const auto& adc = job.description.adc;
+  if (!adc) return {};
+  const double first_V = adc->min_V + 0.5 * adc->lsb_V(), last_V = adc->max_V - 1.5 * adc->lsb_V();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const std::vector<double>& u_V = job.run.samples.u_V[axis];
+    const auto is_off = [&](const Pose& pose) {
+      return std::all_of(u_V.begin() + static_cast<std::ptrdiff_t>(pose.first),
+                         u_V.begin() + static_cast<std::ptrdiff_t>(pose.first + pose.count),
+                         [&](double u) { return u < first_V || u > last_V; });
+    };
+    const auto off = std::count_if(job.run.poses.begin(), job.run.poses.end(), is_off);
+    if (2 * off <= std::ssize(job.run.poses)) continue;
+    return fail(
+        ErrorCode::input,
+        fmt::format("{}: output {} is at the end of the converter's range at {} of {} poses; "
+                    "is it connected?",
+                    job.source, kAxisName[axis], off, job.run.poses.size()));
+  }
+  return {};
+}
+
 /// What goes with the time is stated at the start of the run: of a clock that began decades before,
 /// a drift is a bias that nobody knows.
 Result<void> check_clock(const SampleTable& samples, const std::string& source) {
@@ -222,6 +245,7 @@ Result<CalibrationJob> job_from_database(const std::filesystem::path& database, 
 
 Result<CalibrationOutcome> perform(const CalibrationJob& job, const std::filesystem::path& out) {
   if (job.run.poses.empty()) return fail(ErrorCode::input, job.source + ": holds no pose");
+  if (auto good = check_on_scale(job); !good) return fail(good.error());
   auto folder = OutputFolder::prepare(out);
   if (!folder) return fail(folder.error());
 

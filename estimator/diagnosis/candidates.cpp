@@ -25,6 +25,7 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
   const std::size_t axes = effect.subject() == Subject::head ? 1 : kAxisCount;
   const auto infos = effect.parameters();
   for (std::size_t axis = 0; axis < axes; ++axis) {
+    if (!effect.acts_on(axis)) continue;
     // Hypotheses that free the same amplitudes are the same family.
     std::vector<std::pair<std::vector<bool>, std::size_t>> families;
     for (Hypothesis& hypothesis : effect.hypotheses(log, axis)) {

@@ -14,6 +14,8 @@ namespace plumbline {
 /// A term without a name must be e^7 times as likely as one with a name: a polynomial can imitate
 /// much.
 inline constexpr double kHandicapOfUnnamed = 7;
+/// Which of some forty names it is, is one more choice for every name more, in χ².
+inline constexpr double kOfForty = 7.4;
 
 /// One amplitude of a hypothesis, the others at zero; of shapes and indices alone the hypothesis.
 struct SingleAmplitude {

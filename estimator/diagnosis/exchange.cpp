@@ -19,9 +19,6 @@ namespace {
 /// By how much what takes another's place must be cheaper, in χ².
 constexpr double kWorthExchanging = 2;
 
-/// Which of some forty names it is, is one more choice for every name more, in χ².
-constexpr double kOfForty = 7.4;
-
 /// How many names beyond the first some of the model's effects have, of which there are any.
 double further_names(const SearchModel& model, const std::vector<std::size_t>& effects) {
   std::set<const Effect*> names;

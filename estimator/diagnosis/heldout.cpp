@@ -56,6 +56,13 @@ Eigen::MatrixXd conditional_covariance(const Eigen::MatrixXd& covariance,
 std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
                                         const std::vector<Blocks>& partitions) const {
   const Eigen::Index n = mean_V_[0].size();
+  std::vector<LeftOut> result(partitions.size());
+  for (LeftOut& left_out : result) {
+    left_out.residual_V.fill(
+        Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN()));
+    if (!fit.determined) left_out.power.fill(std::numeric_limits<double>::infinity());
+  }
+  if (!fit.determined) return result;
   const std::vector<Eigen::Index> linear = linear_parameters(fit);
   const Eigen::MatrixXd covariance = conditional_covariance(fit.covariance, linear);
   const Eigen::Index p = covariance.rows();
@@ -103,13 +110,9 @@ std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
     }
     return power;
   };
-  std::vector<LeftOut> result(partitions.size());
   std::vector<std::pair<std::size_t, std::size_t>> work;  // partition and block
-  for (std::size_t part = 0; part < partitions.size(); ++part) {
-    result[part].residual_V.fill(
-        Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN()));
+  for (std::size_t part = 0; part < partitions.size(); ++part)
     for (std::size_t b = 0; b < partitions[part].size(); ++b) work.emplace_back(part, b);
-  }
   std::vector<PerAxis<double>> power(work.size());
   parallel_for(work.size(), [&](std::size_t w) {
     const auto [part, b] = work[w];

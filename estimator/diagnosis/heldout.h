@@ -10,7 +10,8 @@ namespace plumbline {
 struct LeftOut {
   PerAxis<Eigen::VectorXd> residual_V;  ///< n each; NaN for poses in no block
   /// Sum of squares of an axis in units of the noise, of which the readings outside a block tell a
-  /// part: slow noise hides nothing here. About the number of poses for the truth.
+  /// part: slow noise hides nothing here. About the number of poses for the truth; infinite, and no
+  /// residual, for a fit that is not determined.
   PerAxis<double> power{};
 };
 

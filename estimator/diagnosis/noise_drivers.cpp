@@ -32,8 +32,77 @@ struct Scatter {
   double early_V2 = 0, late_V2 = 0;
 };
 
+Eigen::VectorXd vector_of(const std::vector<double>& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
+}
+
+/// What one unit of anything may be worth to an axis at each visit: of bias, of any of its scale
+/// factors, of an angle of the head.
+Eigen::MatrixXd worth_of_unit(const VisitLog& log, std::size_t axis) {
+  constexpr double kStep_rad = 1e-4;
+  const auto i = static_cast<Eigen::Index>(axis);
+  Eigen::MatrixXd worth(std::ssize(log.visits), 1 + static_cast<int>(kAxisCount) + 3);
+  for (Eigen::Index k = 0; k < worth.rows(); ++k) {
+    const Visit& visit = log.visits[static_cast<std::size_t>(k)];
+    const HeadGeometry head{.delta_rad = visit.delta_rad, .h_rad = visit.h_rad};
+    const Eigen::Vector3d a_g = specific_force_g(head, log.gamma);
+    const auto by_angle = [&](double HeadGeometry::*angle) {
+      HeadGeometry moved = head;
+      moved.*angle += kStep_rad;
+      return (specific_force_g(moved, log.gamma)(i) - a_g(i)) / kStep_rad;
+    };
+    worth.row(k) << 1, a_g.transpose(), by_angle(&HeadGeometry::delta_rad),
+        by_angle(&HeadGeometry::h_rad), by_angle(&HeadGeometry::roll_rad);
+  }
+  return worth;
+}
+
+/// What the readings of an axis do within the dwells but for what changes slowly or is a line
+/// there, less what they do with the recorded columns, to first order and with their squares: a
+/// current that is not steady makes them scatter more where what it does is large, and that is no
+/// noise.
+Eigen::VectorXd left_within_dwells_V(const VisitLog& log, const MeasurementSet& set,
+                                     std::size_t axis) {
+  const SampleTable& samples = set.samples;
+  std::vector<Eigen::ArrayXd> columns;
+  if (!samples.temp_C.empty()) columns.emplace_back(vector_of(samples.temp_C));
+  for (const Covariate& covariate : samples.covariates)
+    columns.emplace_back(vector_of(covariate.value));
+  for (Eigen::ArrayXd& column : columns) column -= column.mean();
+
+  const Eigen::VectorXd u_V = vector_of(samples.u_V[axis]);
+  const Eigen::MatrixXd worth = worth_of_unit(log, axis);
+  const Eigen::Index forms = worth.cols() + 1;
+  Eigen::MatrixXd left = Eigen::MatrixXd::Zero(u_V.size(), 1 + forms * std::ssize(columns));
+  for (std::size_t k = 0; k < set.poses.size(); ++k) {
+    const Pose& pose = set.poses[k];
+    const auto first = static_cast<Eigen::Index>(pose.first);
+    const auto n = static_cast<Eigen::Index>(pose.count);
+    Eigen::MatrixXd of_dwell(n, left.cols());
+    of_dwell.col(0) = u_V.segment(first, n);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const Eigen::VectorXd value = columns[c].segment(first, n);
+      of_dwell.middleCols(1 + forms * static_cast<Eigen::Index>(c), forms)
+          << value * worth.row(static_cast<Eigen::Index>(k)),
+          value.cwiseAbs2();
+    }
+    const Eigen::MatrixXd& slow = log.contrasts.at(pose.count);
+    of_dwell.rowwise() -= of_dwell.colwise().mean().eval();
+    left.middleRows(first, n) = of_dwell - slow * (slow.transpose() * of_dwell);
+  }
+  if (columns.empty()) return left;
+  const auto design = left.rightCols(left.cols() - 1);
+  const Eigen::VectorXd scale = design.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::MatrixXd gram =
+      scale.asDiagonal() * (design.transpose() * design) * scale.asDiagonal();
+  const Eigen::VectorXd seen = scale.cwiseProduct(design.transpose() * left.col(0));
+  const Eigen::VectorXd slopes = gram.completeOrthogonalDecomposition().solve(seen);
+  return left.col(0) - design * scale.cwiseProduct(slopes);
+}
+
 Scatter scatter_of(const VisitLog& log, const MeasurementSet& set, std::size_t axis) {
   const auto visits = std::ssize(set.poses);
+  const Eigen::VectorXd all_left_V = left_within_dwells_V(log, set, axis);
   Scatter scatter{Eigen::VectorXd(visits),
                   Eigen::VectorXd(visits),
                   Eigen::VectorXd(visits),
@@ -44,9 +113,7 @@ Scatter scatter_of(const VisitLog& log, const MeasurementSet& set, std::size_t a
     const Pose& pose = set.poses[static_cast<std::size_t>(k)];
     const auto n = static_cast<Eigen::Index>(pose.count);
     const Eigen::MatrixXd& slow = log.contrasts.at(pose.count);
-    const Eigen::Map<const Eigen::VectorXd> u_V(set.samples.u_V[axis].data() + pose.first, n);
-    Eigen::VectorXd left_V = u_V.array() - u_V.mean();
-    left_V -= slow * (slow.transpose() * left_V);
+    const auto left_V = all_left_V.segment(static_cast<Eigen::Index>(pose.first), n);
     // What white noise leaves of each reading.
     const Eigen::VectorXd share =
         (1 - 1 / static_cast<double>(n) - slow.rowwise().squaredNorm().array()).matrix();

@@ -59,7 +59,10 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
   std::optional<EnlargedFit> without;  // most findings hint at nothing
   const Effect* tried = nullptr;
   std::optional<SearchModel::Entry> best;
-  double best_cost = model.stage().fit.chi2 + model.price_of(instances);
+  // Several effects of one name are no likelier than as many names.
+  const auto further = static_cast<double>(std::max<std::ptrdiff_t>(std::ssize(instances), 1) - 1);
+  const double of_name = repeated.has_name() ? kOfForty * further : 0;
+  double best_cost = model.stage().fit.chi2 + model.price_of(instances) + of_name;
   for (std::size_t c = 0; c < model.list().candidates.size(); ++c) {
     const Candidate& candidate = model.list().candidates[c];
     if (candidate.axis != repeated.axis || candidate.effect == tried) continue;

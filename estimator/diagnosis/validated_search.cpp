@@ -136,6 +136,7 @@ std::optional<std::size_t> what_worsens(const SearchInput& search,
           active.effect->certain(log, axis))
         continue;
       const EnlargedFit without = validation.fit_without(k);
+      if (!without.determined) continue;
       const bool takes_it = !is_known && knows_sensitivity(without, search.start, axis);
       if (worst_takes_it && !takes_it) continue;
       const double left_mps2 = validation.rms_mps2(without, axis);

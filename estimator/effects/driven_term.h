@@ -30,6 +30,10 @@ class DrivenTerm : public SmoothTerm {
   Subject subject() const override {
     return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
   }
+  /// What other axes do with the codes of one they do with the component that these stand for.
+  bool acts_on(std::size_t axis) const override {
+    return driver_->output_of.value_or(axis) == axis;
+  }
   bool at_converter() const override { return driver_->output_of.has_value(); }
   bool remembers() const override { return !driver_->past.empty() || driver_->is_rate(); }
   bool guesses_at_start() const override { return !driver_->past.empty(); }

@@ -14,4 +14,8 @@ enum class CourseOf { one, component, step };
 /// its mean over the dwell.
 std::unique_ptr<SmoothTerm> dwell_course(const VisitLog& log, CourseOf of, int degree);
 
+/// A sine that every arrival sets off and that dies away, exp(−t/τ)·(c·cos 2πft + s·sin 2πft), of
+/// unknown frequency: of one size, or of the size of the step.
+std::unique_ptr<SmoothTerm> ring_down(CourseOf of);
+
 }  // namespace plumbline

@@ -109,6 +109,8 @@ class Effect {
   virtual double term_of_number_g(const TermInput& input, double number) const;
   virtual void displace_by_number(const VisitLog& log, std::size_t visit, double number,
                                   HeadGeometry& head) const;
+  /// Sensor: whether it may be one of this axis.
+  virtual bool acts_on(std::size_t /*axis*/) const { return true; }
   /// Sensor: whether it is a function of what the converter is given, all other terms included.
   virtual bool at_converter() const { return false; }
   /// Sensor: whether the noise of single readings is smaller where it acts.

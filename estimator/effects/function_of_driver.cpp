@@ -13,9 +13,9 @@ namespace {
 
 /// Legendre polynomials of degree 1 … d over the range that was seen. Where the 12 parameters do
 /// not hold its mean, there is one of degree 0: what is proportional to a temperature or to the
-/// time is so from a zero outside the range. Where they do, it is nothing at the driver's
-/// reference, and has no slope there (or at the end of the range next to it) where they hold that,
-/// too: it is a power series without its first terms.
+/// time is so from a zero outside the range, and what sags with h is so from a level spindle on.
+/// Where they do, it is nothing at the driver's reference, and has no slope there (or at the end of
+/// the range next to it) where they hold that, too: it is a power series without its first terms.
 class Polynomial final : public DrivenTerm {
  public:
   Polynomial(DriverPointer driver, Target target, int degree)
@@ -39,7 +39,10 @@ class Polynomial final : public DrivenTerm {
       if (degree_ == 1) return {};
       p[2] = 0;
     }
-    return {{std::move(p)}};
+    if (!is_of_h() || first_degree() > 0) return {{std::move(p)}};
+    std::vector<double> without_mean = p;
+    without_mean[2] = 0;
+    return {{std::move(without_mean)}, {std::move(p)}};
   }
 
  private:
@@ -66,9 +69,10 @@ class Polynomial final : public DrivenTerm {
                                                : !target().second;
   }
   bool has_reference() const { return variable().reference && mean_in_the_twelve(); }
+  bool is_of_h() const { return variable().name == "h_deg"; }
   int first_degree() const {
-    const bool clock_or_record = variable().recorded || variable().is_clock();
-    return clock_or_record && !mean_in_the_twelve() ? 0 : 1;
+    const bool may_be_offset = variable().recorded || variable().is_clock() || is_of_h();
+    return may_be_offset && !mean_in_the_twelve() ? 0 : 1;
   }
 
   int degree_;
@@ -156,6 +160,73 @@ class Harmonic final : public DrivenTerm {
   }
 
   int lowest_;
+};
+
+/// A wheel with n arms, say: what it does in one part of the turn it does in each, and mostly not
+/// as a sine does.
+class HarmonicsOfPart final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    std::vector<ParameterInfo> infos = {{"n", "", ParameterRole::index}};
+    for (int order = 1; order <= kOrders; ++order)
+      for (const char* part : {"c", "s"})
+        infos.push_back({part + std::to_string(order), target().unit(), ParameterRole::amplitude});
+    return infos;
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    std::vector<Hypothesis> starts;
+    for (int n = kFewestParts; is_seen(2 * n); ++n) add_parts(n, starts);
+    return starts;
+  }
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& found) const override {
+    std::vector<Hypothesis> starts;
+    if (repeated.id() != "rig.delta_periodic" || found.size() < 2) return starts;
+    const double n = std::min_element(found.begin(), found.end())->front();
+    add_parts(static_cast<int>(n), starts);
+    std::erase_if(starts, [&](const Hypothesis& start) {
+      return !std::all_of(found.begin(), found.end(), [&](const std::vector<double>& harmonic) {
+        const double order = harmonic.front() / n;
+        return order == std::floor(order) && start.p[place_of(static_cast<int>(order))] != 0;
+      });
+    });
+    return starts;
+  }
+
+ private:
+  static constexpr int kFewestParts = 3;  // fewer are the first harmonics of the turn
+  static constexpr int kHighest = 18;
+  static constexpr int kOrders = kHighest / kFewestParts;
+
+  std::string function() const override { return "harmonics of a part of the turn"; }
+  double at(double value, const double* p) const override {
+    double sum = 0;
+    for (int order = 1; order <= kOrders; ++order) {
+      const double phase = p[0] * order * value;
+      const double* amplitude = p + place_of(order);
+      sum += amplitude[0] * std::cos(phase) + amplitude[1] * std::sin(phase);
+    }
+    return sum;
+  }
+  /// Of the two amplitudes of an order among the parameters.
+  static std::size_t place_of(int order) { return static_cast<std::size_t>(2 * order - 1); }
+  /// Positions at equal distances do not show a harmonic with less than two of them a period.
+  bool is_seen(int harmonic) const {
+    return harmonic <= kHighest && 2 * harmonic < effect::positions_of_a_turn(variable().value[0]);
+  }
+  /// The first few orders, or the first few that are odd: up and down alike.
+  void add_parts(int n, std::vector<Hypothesis>& starts) const {
+    for (const int step : {1, 2}) {
+      Hypothesis start{std::vector<double>(parameters().size(), 0)};
+      start.p[0] = n;
+      for (int order = 1; order <= kOrders && is_seen(n * order); order += step) {
+        for (const std::size_t k : {0U, 1U}) start.p[place_of(order) + k] = target().typical_size();
+        if (order > 1) starts.push_back(start);
+      }
+    }
+  }
 };
 
 class Wave final : public DrivenTerm {
@@ -356,6 +427,9 @@ std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& 
 }
 std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target, int lowest) {
   return std::make_unique<Harmonic>(std::move(driver), target, lowest);
+}
+std::unique_ptr<SmoothTerm> harmonics_of_part(DriverPointer angle, const Target& target) {
+  return std::make_unique<HarmonicsOfPart>(std::move(angle), target);
 }
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest) {

@@ -55,6 +55,8 @@ std::unique_ptr<SmoothTerm> harmonic_series(DriverPointer driver, const Target& 
 /// One harmonic of an angle, this one or a higher one, as far as the positions tell it from lower
 /// ones.
 std::unique_ptr<SmoothTerm> harmonic(DriverPointer driver, const Target& target, int lowest);
+/// Of order n, 2n … or n, 3n … of an angle: what repeats itself with each of n parts of the turn.
+std::unique_ptr<SmoothTerm> harmonics_of_part(DriverPointer angle, const Target& target);
 /// One wave of unknown period, none shorter than `shortest`.
 std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, const Cycles& cycles,
                                  double shortest = 0);
@@ -93,8 +95,10 @@ std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target);
 std::unique_ptr<SmoothTerm> power(DriverPointer driver, const Target& target);
 /// ln(1 + distance from where the driver began over an unknown one).
 std::unique_ptr<SmoothTerm> logarithm(DriverPointer driver, const Target& target);
-/// What follows the driver through a play of unknown width lags behind it by this function.
-std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target);
+/// What follows the driver through a play of unknown width: by how much it lags behind, or how far
+/// it is from the driver's reference.
+enum class OfPlay { lag, follower };
+std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target, OfPlay of);
 /// What the driver draws along against friction: from −1 to 1, over an unknown reach.
 std::unique_ptr<SmoothTerm> friction(DriverPointer driver, const Target& target);
 

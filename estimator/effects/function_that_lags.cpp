@@ -53,21 +53,26 @@ class Lag : public DrivenTerm {
   std::uint64_t number_ = next_number();
 };
 
-class PlayLag final : public Lag {
+/// What follows the driver through a play, itself or by how much it lags behind.
+class Play final : public Lag {
  public:
-  PlayLag(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 2) {}
+  Play(DriverPointer driver, const Target& target, OfPlay of)
+      : Lag(std::move(driver), target, of == OfPlay::lag ? 2 : 3), of_(of) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"width", variable().unit(), ParameterRole::shape},
-            {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true},
-            {"p", target().unit(), ParameterRole::amplitude}};
+    std::vector<ParameterInfo> infos = {
+        {"width", variable().unit(), ParameterRole::shape},
+        {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true}};
+    if (of_ == OfPlay::follower) infos.push_back({"ref", variable().unit(), ParameterRole::index});
+    infos.push_back({"p", target().unit(), ParameterRole::amplitude});
+    return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
     for (const double share : effect::geometric(0.01, 0.64, 7))
       if (const double width = share * (high - low); shows(axis, width, kMiddle))
-        starts.push_back({{width, kMiddle, target().typical_size()}});
+        starts.push_back(at_reference({width, kMiddle, target().typical_size()}));
     return starts;
   }
   // Wherever a visit begins to draw or ceases to, the fit may stop.
@@ -76,18 +81,25 @@ class PlayLag final : public Lag {
     std::vector<Hypothesis> others;
     for (const double off : effect::geometric(0.004, 0.12, 6))
       for (const double ratio : {1 - off, 1 + off})
-        others.push_back({{ratio * found.p[0], found.p[1], found.p[2]}});
+        others.push_back(at_reference({ratio * found.p[0], found.p[1], found.p.back()}));
     for (const double start : {-1.0, -0.5, 0.5, 1.0})
       for (const double ratio : {0.75, 1.0})
         if (shows(axis, ratio * found.p[0], start))
-          others.push_back({{ratio * found.p[0], start, found.p[2]}});
+          others.push_back(at_reference({ratio * found.p[0], start, found.p.back()}));
     return others;
   }
 
  private:
   static constexpr double kMiddle = 0;
 
-  std::string function() const override { return "lag behind a play"; }
+  std::string function() const override {
+    return of_ == OfPlay::lag ? "lag behind a play" : "drawn through a play";
+  }
+  /// Width, start and amplitude as parameters().
+  Hypothesis at_reference(std::vector<double> p) const {
+    if (of_ == OfPlay::follower) p.insert(p.end() - 1, variable().reference.value_or(0));
+    return {std::move(p)};
+  }
   /// What came before the first visit drew the follower to one end of the play (−1: the lower) or
   /// left it between them.
   static double at_start(double driver, double half, double start) {
@@ -114,15 +126,17 @@ class PlayLag final : public Lag {
   std::vector<double> course(std::size_t axis, const double* shape) const override {
     const std::vector<double>& driver = variable().value[axis];
     const double half = 0.5 * std::abs(shape[0]);
-    std::vector<double> lag(driver.size());
+    std::vector<double> course(driver.size());
     double follower = 0;
     for (std::size_t k = 0; k < driver.size(); ++k) {
       if (variable().way_begins(k)) follower = at_start(driver[k], half, shape[1]);
       follower = std::clamp(follower, driver[k] - half, driver[k] + half);
-      lag[k] = follower - driver[k];
+      course[k] = follower - (of_ == OfPlay::lag ? driver[k] : shape[2]);
     }
-    return lag;
+    return course;
   }
+
+  OfPlay of_;
 };
 
 /// Friction in a spring: what was drawn to one side is at the end of its reach, and gives back
@@ -185,8 +199,8 @@ class FrictionLag final : public Lag {
 
 }  // namespace
 
-std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target) {
-  return std::make_unique<PlayLag>(std::move(driver), target);
+std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target, OfPlay of) {
+  return std::make_unique<Play>(std::move(driver), target, of);
 }
 std::unique_ptr<SmoothTerm> friction(DriverPointer driver, const Target& target) {
   return std::make_unique<FrictionLag>(std::move(driver), target);

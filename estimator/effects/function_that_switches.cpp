@@ -208,8 +208,9 @@ class SawTooth final : public DrivenTerm {
     constexpr int kMostTeeth = 12;
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    if (is_of_another_axis(axis) || !resolves(4 * kMostTeeth)) return starts;
-    for (int halves = 4; halves <= 2 * kMostTeeth; ++halves) add(2 * (high - low) / halves, starts);
+    if (is_of_another_axis(axis)) return starts;
+    for (int halves = 4; halves <= 2 * kMostTeeth && resolves(2 * halves); ++halves)
+      add(2 * (high - low) / halves, starts);
     return starts;
   }
   std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,

@@ -88,7 +88,7 @@ class TermList {
     add_of_wound_up_spindle();
     const auto attitude = shared(load(log_));
     if (any_ || attitude->varies()) {
-      add(play(attitude, kBias));
+      add(play(attitude, kBias, OfPlay::lag));
       add(friction(attitude, kBias));
       add(friction(attitude, {.form = TermForm::scale, .second = 0}));
     }
@@ -99,6 +99,7 @@ class TermList {
     }
     for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
       for (const int degree : {1, 2, 3}) add(dwell_course(log_, of, degree));
+    for (const CourseOf of : {CourseOf::one, CourseOf::step}) add(ring_down(of));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
       for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
         add(head_decay(angle, of));
@@ -170,8 +171,10 @@ class TermList {
   void add_of_column(const DriverPointer& driver) {
     columns_.push_back(driver);
     for (const Target& target : {kBias, kScale}) add_steps(driver, target);
-    for (const Target& target : {kBias, kScale}) add(play(driver, target));
+    for (const Target& target : {kBias, kScale})
+      for (const OfPlay of : {OfPlay::lag, OfPlay::follower}) add(play(driver, target, of));
     add(wave(driver, kBias, {1.5, 0.5, 10}));
+    add(saw_tooth(driver, kBias));  // a compensation that goes by steps
   }
   /// The longest time constant that the visits show.
   double longest_s() const {
@@ -228,6 +231,7 @@ class TermList {
     const auto [low, high] = std::minmax_element(h->value[0].begin(), h->value[0].end());
     const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
     for (const Target& target : {kBias, kH}) add(wave(h, target, {2 * turns, turns, 8 * turns}));
+    add_polynomials(h, kRoll, {1, 2, 3, 5});
     for (const Target& target : {kDelta, kH}) {
       add(one_position(h, target));
       add(harmonic(h, target, 9));
@@ -240,6 +244,7 @@ class TermList {
     for (const Target& target : {kH, kRoll}) add(harmonic(delta, target, 1));
     constexpr int kFirstUnlisted = 18;
     add(harmonic(delta, kDelta, kFirstUnlisted));
+    add(harmonics_of_part(delta, kDelta));
     for (const Target& angle : {kDelta, kH})
       for (const Target& target : pulled(angle)) add(harmonic(delta, target, 1));
   }
@@ -267,6 +272,7 @@ class TermList {
     for (const Target& target : {kBias, kScale, kDelta, kH})
       add_polynomials(turn, target, {1, 2, 3});
     for (const Target& target : {kDelta, kH, kSkew}) add(wave(turn, target, {0.2, 0.2, 6}));
+    add(saw_tooth(turn, kDelta));
   }
   void add_of_code(const DriverPointer& code) {
     // What repeats from step to step, or every second step, is the rounding itself, or a bit.

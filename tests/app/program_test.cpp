@@ -391,6 +391,15 @@ INSTANTIATE_TEST_SUITE_P(
                    dead.write(f.path());
                  },
                  "output y does not follow the acceleration"},
+        BadInput{"AxisAtTheEndOfItsConverter",
+                 [](const TempFolder& f) {
+                   ExampleSet off_scale;
+                   off_scale.parameters.row(2) << 0, 0, 0, -5.01;
+                   off_scale.write(f.path());
+                   write_text(f / "run.toml",
+                              example_run_toml() + "[adc]\nbits = 16\nmin_V = -5\nmax_V = 0\n");
+                 },
+                 "output z is at the end of the converter's range at "},
         BadInput{"ContradictoryConfig",
                  [](const TempFolder& f) {
                    write_text(f / "run.toml",

@@ -83,6 +83,26 @@ TEST(NoiseDrivers, QuietPosesCountForMore) {
   EXPECT_LT(square / expected, 1.6);
 }
 
+// The readings scatter most where the current is large: as noise that follows it.
+TEST(NoiseDrivers, TheSquareOfACurrentThatIsNotSteadyIsNoNoise) {
+  SyntheticOptions options = fine_grid();
+  std::vector<double> current_A;
+  options.more_V[0] = [&current_A, random = std::mt19937_64(8)](const auto&, double t_s) mutable {
+    const double mean_A = 0.5 * std::sin(t_s / 100);
+    current_A.push_back(std::normal_distribution<double>(mean_A, 0.1)(random));
+    return 2e-3 * current_A.back() * current_A.back();
+  };
+  SyntheticRun data = synthetic_run(4, kSixteenBits, options);
+  const auto first = current_A.end() - std::ssize(data.run.samples.t_s);
+  data.run.samples.covariates.push_back({"motor_A", {first, current_A.end()}});
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_EQ(result.diagnosis.unlisted.size(), 1U);
+  EXPECT_EQ(result.diagnosis.unlisted.front().driver, "motor_A");
+  EXPECT_EQ(result.diagnosis.unlisted.front().form, "bias");
+}
+
 TEST(NoiseDrivers, NoiseThatFollowsNothingHasNoDriver) {
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     const Calibration result = calibrated(synthetic_run(seed, kSixteenBits));

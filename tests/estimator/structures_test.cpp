@@ -198,6 +198,17 @@ TEST(Structure, TheLastHarmonicThatThePositionsShowIsAnAngle) {
   expect_only_structure(options, {"delta_deg", "geometry", "harmonic, added to delta"});
 }
 
+// As three periodic errors of the drive, by name.
+TEST(Structure, AWheelWithThreeArmsHasOneErrorThreeTimes) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.delta_error_deg = [](double delta_deg, double) {
+    return 6 * std::abs(std::remainder(delta_deg - 17, 120) / 60);
+  };
+  expect_only_structure(
+      options, {"delta_deg", "geometry", "harmonics of a part of the turn, added to delta"});
+}
+
 TEST(Structure, AWobbleThatGrowsWithTheWeightIsOneHarmonic) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
@@ -218,6 +229,18 @@ TEST(Structure, ARollThatFollowsTheTurnIsNoWaveInTime) {
     return 0.4 * std::cos(2 * delta_deg * std::acos(-1.0) / 180 + 1);
   };
   expect_only_structure(options, {"delta_deg", "geometry", "harmonic, added to the base roll"});
+}
+
+// As a scale of h by name, and a function of h added to delta.
+TEST(Structure, AFrameThatBendsSidewaysRollsWithTheTilt) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.roll_error_deg = [](double, double h_deg) {
+    return 2 * std::cos(3 * h_deg * std::acos(-1.0) / 180);
+  };
+  expect_only_structure(options,
+                        {"h_deg", "geometry", "polynomial of degree 5, added to the base roll"});
 }
 
 // Between two rings h rises and time passes: the time would have to jump just there.
@@ -318,6 +341,31 @@ TEST(Structure, WhatFollowsATemperatureThatRisesSteadilyCouldFollowTheTime) {
   EXPECT_THAT(found.separate_by, HasSubstr(other));
 }
 
+// As a coefficient of temperature by name, and a lag behind the temperature.
+TEST(Structure, WhatATemperatureDrawsThroughAPlayIsOneFunctionOfIt) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  const auto temperature_C = [](double t_s) { return 21 + 3 * std::sin(t_s / 60); };
+  options.more_V[0] = [temperature_C, drawn_C = temperature_C(0)](const auto&, double t_s) mutable {
+    constexpr double kHalfPlay_C = 1;
+    drawn_C =
+        std::clamp(drawn_C, temperature_C(t_s) - kHalfPlay_C, temperature_C(t_s) + kHalfPlay_C);
+    return 1e-3 * drawn_C;
+  };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  for (const double t_s : data.run.samples.t_s)
+    data.run.samples.temp_C.push_back(temperature_C(t_s));
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, "temp_C");
+  EXPECT_EQ(found.form, "bias");
+  EXPECT_EQ(found.shape, "drawn through a play");
+  EXPECT_NEAR(found.parameters[0].value, 2, 3 * found.parameters[0].u);
+}
+
 // As a step of the bias in time and another structure beside it.
 TEST(Structure, ABellOverTwoRingsIsOne) {
   SyntheticOptions options;
@@ -393,6 +441,24 @@ TEST(Structure, ACrossSensitivityThatJumpsIsAScale) {
   options.delta_step_deg = 10;
   options.more_V[0] = [](const auto& a_g, double t_s) { return t_s > 280 ? 2e-3 * a_g[1] : 0.0; };
   expect_only_structure(options, {"t_s", "scale", "step, times the component of the next axis"});
+}
+
+// As settling by name, a course over the dwell, and something that came before.
+TEST(Structure, WhatRingsAfterEveryMoveIsOneCourse) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.samples_per_pose = 40;
+  options.random_order = true;
+  options.more_V[0] = [before = AtPoseBefore()](const auto& a_g, double t_s) mutable {
+    constexpr double kFirst_s = 61, kPeriod_s = 3, kTau_s = 0.15, kFrequency_hz = 8;
+    const double came_from_g = before(a_g[0], t_s);
+    if (t_s < kFirst_s) return 0.0;
+    const double since_s = std::remainder(t_s - kFirst_s, kPeriod_s);
+    return 5e-3 * (came_from_g - a_g[0]) * std::exp(-since_s / kTau_s) *
+           std::cos(2 * std::numbers::pi * kFrequency_hz * since_s);
+  };
+  expect_only_structure(options, {"t_in_pose", "sample",
+                                  "ringing that dies away, times the change of a_i on the way"});
 }
 
 TEST(Structure, WhatAnotherAxisFeltBeforeIsOneStraightLine) {
