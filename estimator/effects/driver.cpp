@@ -237,6 +237,18 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   return drivers;
 }
 
+Driver component_before(const VisitLog& log) {
+  Driver driver{"previous_pose", "component of a_i before", {}};
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const std::vector<double> a_g = specific_force_component_g(log, i);
+    for (std::size_t k = 0; k < a_g.size(); ++k)
+      driver.value[i].push_back(log.before(k) ? a_g[k - 1] : 0.0);
+  }
+  driver.span = about_zero(driver.value);
+  driver.reference = 0;
+  return driver;
+}
+
 Driver load(const VisitLog& log) {
   Driver driver{"previous_pose", "", {}};
   if (log.moved_since) driver.begins_anew = log.earlier;

@@ -64,6 +64,9 @@ std::vector<Driver> changes_of_others(const VisitLog& log);
 /// way, under the name of what came before.
 std::vector<Driver> sizes_of_changes(const VisitLog& log);
 
+/// The component of the own axis at the previous pose, under the name of what came before.
+Driver component_before(const VisitLog& log);
+
 /// The specific force of the own axis, under the name of what came before: for what follows it.
 Driver load(const VisitLog& log);
 

@@ -124,7 +124,8 @@ class Window final : public DrivenTerm {
       const std::vector<double>& train = steps.front();
       return {half_way(train[3] - 0.5 * train[2], train[3] + 0.5 * train[2], train[4])};
     }
-    if (repeated.id() != "sensor.bias_step" || steps.size() != 2) return {};
+    if (repeated.id() != "sensor.bias_step" || target().form != TermForm::bias || steps.size() != 2)
+      return {};
     const bool in_order = steps[0][1] < steps[1][1];
     const std::vector<double>&first = steps[in_order ? 0 : 1], &second = steps[in_order ? 1 : 0];
     if (!(first[0] * second[0] < 0)) return {};

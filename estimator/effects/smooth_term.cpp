@@ -85,6 +85,8 @@ class TermList {
              [&](const DriverPointer& driver) { add(friction(driver, kBias)); });
     for_each(changes_of_others(log_), add_line);
     for_each(sizes_of_changes(log_), add_line);
+    for_each({component_before(log_)},
+             [&](const DriverPointer& driver) { add_polynomials(driver, kScale, {1}); });
     add_of_wound_up_spindle();
     const auto attitude = shared(load(log_));
     if (any_ || attitude->varies()) {
@@ -182,7 +184,7 @@ class TermList {
   }
   void add_of_clock(const DriverPointer& clock) {
     add(bell(clock, kBias));
-    add(window(clock, kBias));
+    for (const Target& target : {kBias, kScale}) add(window(clock, target));
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));
     for (const Target& target : {kBias, kScale}) {
@@ -232,6 +234,7 @@ class TermList {
     const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
     for (const Target& target : {kBias, kH}) add(wave(h, target, {2 * turns, turns, 8 * turns}));
     add_polynomials(h, kRoll, {1, 2, 3, 5});
+    add_steps(h, kRoll);
     for (const Target& target : {kDelta, kH}) {
       add(one_position(h, target));
       add(harmonic(h, target, 9));
