@@ -369,6 +369,12 @@ std::vector<SearchModel::Entry> names_for(const SearchModel& model, const Some& 
     if (!next) break;
     fit = model.looked_closer(with_shapes_released(model, std::move(next->fit)));
     price += model.price_in(fit, next->entry.candidate);
+    const Candidate& last = model.list().candidates[next->entry.candidate];
+    const bool again = std::any_of(names.begin(), names.end(), [&](const SearchModel::Entry& name) {
+      const Candidate& other = model.list().candidates[name.candidate];
+      return other.effect == last.effect && other.axis == last.axis;
+    });
+    if (again) price += kOfForty;  // no likelier than another name
     next->entry.parameters = fit.parameters;
     names.push_back(std::move(next->entry));
     if (fit.chi2 + price >= least_cost) continue;

@@ -51,6 +51,17 @@ std::vector<Candidate> likeliest(const SearchModel& model, const CandidateList& 
   return few;
 }
 
+/// The candidate of the list that is of the same family: from `first` on, the first of its effect.
+std::size_t like_it(const CandidateList& list, std::size_t first, const Candidate& one) {
+  const auto is_free = [](const Candidate& candidate) { return candidate.active().free; };
+  for (std::size_t c = first;
+       c < list.candidates.size() && list.candidates[c].effect == one.effect &&
+       list.candidates[c].axis == one.axis;
+       ++c)
+    if (is_free(list.candidates[c]) == is_free(one)) return c;
+  return first;
+}
+
 /// One candidate in the place of the `instances` of the candidate `repeated`, whose parameters
 /// are `p`; of all that could be one, so many were looked at; noise may do as well so often.
 bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instances,
@@ -80,13 +91,14 @@ bool replace_in_one(SearchModel& model, const std::vector<std::size_t>& instance
       const ActiveEffect active = one.active();
       const EnlargedFit with = model.fit_with(without->parameters, active);
       const auto dof = static_cast<int>(active.free_count());
-      const double cost = with.chi2 + model.price(c);
+      const std::size_t alike = like_it(model.list(), c, one);
+      const double cost = with.chi2 + model.price(alike);
       if (!with.determined || cost >= best_cost) continue;
       const double p_value = p_of_search(
           log_chi_squared_tail(without->chi2 - with.chi2, static_cast<double>(dof)), looks);
       if (p_value > false_alarm) continue;
       best_cost = cost;
-      best = {c, p_value, with.parameters};
+      best = {alike, p_value, with.parameters};
     }
   }
   return best && model.exchange(instances, *best);
