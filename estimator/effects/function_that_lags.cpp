@@ -70,7 +70,7 @@ class Play final : public Lag {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    for (const double share : effect::geometric(0.01, 0.64, 7))
+    for (const double share : {0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65})
       if (const double width = share * (high - low); shows(axis, width, kMiddle))
         starts.push_back(at_reference({width, kMiddle, target().typical_size()}));
     return starts;

@@ -340,6 +340,10 @@ TEST(OwnEffects, Geometry) {
            {0.4358922068, -0.7549874489, 0.4898897182});
   expect_g(reading_with("id = 'own.worn_tooth'\nc = 1\nat = 50\nwidth = 10"),  // δ + e^−½
            {0.4250491204, -0.7545417452, 0.5});
+  expect_g(reading_with("id = 'own.wheel_arms'\nc = 1\narms = 3"),  // half way: δ + 1°
+           {0.4198574471, -0.7574428850, 0.5});
+  expect_g(reading_with("id = 'own.frame_twist'\nc = 1"),  // sin 90°
+           reading_with("id = 'rig.base_roll'\nepsilon = 1"));
   PlainUnit sag(effect("id = 'own.brake_sag'\nc = 1\ntau = 2"));
   sag.go(0, 60, 30);
   expect_g(sag.reading_g(0), kNominal);
@@ -349,11 +353,22 @@ TEST(OwnEffects, Geometry) {
 TEST(OwnEffects, Temperature) {  // T − T₀ = 2 K
   expect_g(reading_with("id = 'own.thermal_twist'\nc = 0.01"),
            kNominal + std::array{-0.015, 0.01, 0.008660254038});
+  expect_g(reading_with("id = 'own.thermal_drag'\nb = 0.01\nwidth = 1"),
+           kNominal + std::array{0.02, 0.02, 0.02});
   // Self-heating by 1 − e^−1 of 10 K after 100 s, air at 22 °C; a_x·a_z = 0.2165
   PlainUnit chimney("[room]\nself_heating_C = 10\nself_heating_tau_s = 100\n" +
                     effect("id = 'own.chimney'\naxes = ['x']\nb = 0.01"));
   chimney.go(100, 60, 30);
   expect_g(chimney.reading_g(), kNominal + std::array{0.01 * 6.321205588 * 0.2165063509, 0.0, 0.0});
+}
+
+TEST(OwnEffects, WhatAMoveSetsOff) {
+  PlainUnit ringing(effect("id = 'own.ringing'\naxes = ['x']\nc = 0.1\ntau = 0.5\nf = 1"));
+  ringing.go(0, 0, 0);
+  expect_g(ringing.reading_g(), {1, 0, 0});
+  ringing.go(10, 90, 0);  // a_x from 1 to 0
+  expect_g(ringing.reading_g(10), {0.1, -1, 0});
+  expect_g(ringing.reading_g(10.5), {-0.03678794412, -1, 0});  // half a turn and a time constant
 }
 
 TEST(OwnEffects, MemoryOfEarlierPoses) {

@@ -17,7 +17,9 @@
 // name counts as claimed instead, even beside the right driver.
 //
 // Left out, since no driver predicts them on fresh poses or since they move no means at all:
-// own.popcorn, own.clamp_scatter, own.arm_vibration, own.traffic, own.fan.
+// own.popcorn, own.clamp_scatter, own.arm_vibration, own.traffic, own.fan; and own.ringing, which
+// moves means by the size of their noise only where it is a hundred times as large within the
+// dwell.
 #include <cmath>
 
 #include "tests/study/diagnosis.h"
@@ -43,6 +45,10 @@ DrawParameters with_tau_of_dwell(const char* amplitude) {
 Parameters thermal_hysteresis(const DrawContext& at) {
   return {{"b", at.random.sign()}, {"width", at.world.room.cycle_C * at.random.uniform(0.4, 1.6)}};
 }
+/// Less than the temperature turns by in half a cycle: short runs see no more.
+Parameters thermal_drag(const DrawContext& at) {
+  return {{"b", at.random.sign()}, {"width", at.world.room.cycle_C * at.random.uniform(0.2, 0.7)}};
+}
 Parameters stiction(const DrawContext&) { return {{"friction", 1}}; }
 Parameters inl_ripple(const DrawContext& at) {
   const double seen_g = at.axis == 2 ? 1 : 2;
@@ -59,6 +65,9 @@ Parameters worn_tooth(const DrawContext& at) {
   return {{"c", at.random.sign()},
           {"at", at.random.uniform(0, 360)},
           {"width", at.random.uniform(10, 30)}};
+}
+Parameters wheel_arms(const DrawContext& at) {
+  return {{"c", at.random.sign()}, {"arms", std::floor(at.random.uniform(3, 6))}};
 }
 Parameters floor_tilt(const DrawContext& at) {
   return {{"c", at.random.sign()},
@@ -88,6 +97,13 @@ std::vector<StudyEffect> own_study_effects() {
        {"sensor.temperature_bias", "covariate:temp_C"},
        {"temp_C", "temp_C.rate"},
        thermal_hysteresis,
+       {"b"}},
+      {"own.thermal_drag",
+       "xyz",
+       0.5,
+       {"sensor.temperature_bias", "covariate:temp_C"},
+       {"temp_C", "temp_C.rate"},
+       thermal_drag,
        {"b"}},
       {"own.thermal_gradient",
        "xyz",
@@ -131,6 +147,8 @@ std::vector<StudyEffect> own_study_effects() {
        {"c"}},
       {"own.cable_pull", "", 10, {}, {"delta_deg"}, either_sign("c"), {"c"}},
       {"own.worn_tooth", "", 10, {}, {"delta_deg"}, worn_tooth, {"c"}},
+      {"own.wheel_arms", "", 10, {}, {"delta_deg"}, wheel_arms, {"c"}},
+      {"own.frame_twist", "", 10, {}, {"h_deg"}, either_sign("c"), {"c"}},
       {"own.brake_sag",
        "",
        10,

@@ -25,6 +25,21 @@ std::unique_ptr<Effect> worn_tooth(const EffectContext& p) {
       });
 }
 
+/// A wheel on a few arms sags between them: δ goes up and down in straight lines with each.
+std::unique_ptr<Effect> wheel_arms(const EffectContext& p) {
+  return head_term([c = p("c"), arms = p("arms")](const Moment& now, HeadErrors& errors) {
+    const double from_arm = std::remainder(arms * now.delta_deg / 360, 1.0);
+    errors.delta_index_deg += c * (4 * std::abs(from_arm) - 1);
+  });
+}
+
+/// A frame that twists as the arm rises: the base rolls with h.
+std::unique_ptr<Effect> frame_twist(const EffectContext& p) {
+  return head_term([c = p("c")](const Moment& now, HeadErrors& errors) {
+    errors.base_roll_deg += c * sin_deg(3 * now.h_deg);
+  });
+}
+
 /// The brake of the tilt axis gives way after every stop and sinks to its end position.
 std::unique_ptr<Effect> brake_sag(const EffectContext& p) {
   return head_term([c = p("c"), tau = p("tau")](const Moment& now, HeadErrors& errors) {
@@ -113,6 +128,20 @@ const EffectInfo kOwnHeadEffects[] = {
      false,
      {{"c", "deg"}, {"at", "deg"}, {.name = "width", .unit = "deg", .min = 1e-3}},
      worn_tooth},
+    {"own.wheel_arms",
+     "delta += c*(4*distance to the nearest arm, in parts of their spacing, - 1)",
+     "delta_deg",
+     "geometry",
+     false,
+     {{"c", "deg"}, {.name = "arms", .unit = "1", .min = 1}},
+     wheel_arms},
+    {"own.frame_twist",
+     "base roll += c*sin(3*h)",
+     "h_deg",
+     "geometry",
+     false,
+     {{"c", "deg"}},
+     frame_twist},
     {"own.brake_sag",
      "h -= c*cos(h)*(1-exp(-(t-t_arrival)/tau))",
      "t_in_pose",

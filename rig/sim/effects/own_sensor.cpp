@@ -27,6 +27,26 @@ class ThermalHysteresis final : public Effect {
   double offset_C_ = 0;
 };
 
+/// The same frame where the glue is all that holds it: the bias is where the play has drawn it.
+class ThermalDrag final : public Effect {
+ public:
+  explicit ThermalDrag(const EffectContext& p)
+      : mask_(axis_mask(p.setting)),
+        b_(p("b")),
+        reference_C_(p.world.reference_C),
+        play_(p("width") / 2) {}
+  void observe(const Moment& now) override { drawn_C_ = play_.next(now.temp_C) - reference_C_; }
+  double sensor_g(const Moment&, std::size_t axis) override {
+    return mask_[axis] ? b_ * drawn_C_ : 0.0;
+  }
+
+ private:
+  std::array<bool, 3> mask_;
+  double b_, reference_C_;
+  Play play_;
+  double drawn_C_ = 0;
+};
+
 /// A housing that heats up from outside: while its temperature changes, a gradient bends it.
 class ThermalGradient final : public Effect {
  public:
@@ -91,6 +111,14 @@ class Stiction final : public Effect {
   PerAxis<double> remainder_{};
 };
 
+/// A fixture that is not stiff: every move leaves it ringing, the more the further the load turned.
+std::unique_ptr<Effect> ringing(const EffectContext& p) {
+  return sensor_term(p, [c = p("c"), tau = p("tau"), f = p("f")](const Moment& now, std::size_t i) {
+    return c * (now.a_previous[i] - now.a[i]) * std::exp(-now.t_in_pose_s / tau) *
+           std::cos(kTurn_rad * f * now.t_in_pose_s);
+  });
+}
+
 /// Axes whose directions move with temperature: the output takes up the next axis, x ← y ← z ← x.
 std::unique_ptr<Effect> thermal_twist(const EffectContext& p) {
   return sensor_term(p, [c = p("c"), t0 = p.world.reference_C](const Moment& now, std::size_t i) {
@@ -113,6 +141,13 @@ const EffectInfo kOwnSensorEffects[] = {
      true,
      {{"b", "g/K"}, {.name = "width", .unit = "K", .min = 0}},
      make<ThermalHysteresis>},
+    {"own.thermal_drag",
+     "b*(play(T) - T0), play of the given width",
+     "temp_C",
+     "bias",
+     true,
+     {{"b", "g/K"}, {.name = "width", .unit = "K", .min = 0}},
+     make<ThermalDrag>},
     {"own.thermal_gradient",
      "b*(T - T lagged by tau)",
      "temp_C.rate",
@@ -134,6 +169,13 @@ const EffectInfo kOwnSensorEffects[] = {
      true,
      {{.name = "friction", .unit = "g", .min = 0}},
      make<Stiction>},
+    {"own.ringing",
+     "c*(a_i at the previous pose - a_i)*exp(-(t-t_arrival)/tau)*cos(2*pi*f*(t-t_arrival))",
+     "t_in_pose",
+     "sample",
+     true,
+     {{"c", "1"}, kTau, {.name = "f", .unit = "Hz", .min = 0}},
+     ringing},
     {"own.thermal_twist",
      "c*(T-T0)*a_(i+1), axes counted cyclically",
      "temp_C",
