@@ -232,7 +232,8 @@ class TermList {
   void add_harmonics_of_h(const DriverPointer& h) {
     const auto [low, high] = std::minmax_element(h->value[0].begin(), h->value[0].end());
     const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
-    for (const Target& target : {kBias, kH}) add(wave(h, target, {2 * turns, turns, 8 * turns}));
+    for (const Target& target : {kBias, kH, kDelta, kRoll})
+      add(wave(h, target, {2 * turns, turns, 8 * turns}));
     add_polynomials(h, kRoll, {1, 2, 3, 5});
     add_steps(h, kRoll);
     for (const Target& target : {kDelta, kH}) {

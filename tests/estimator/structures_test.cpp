@@ -239,8 +239,7 @@ TEST(Structure, AFrameThatBendsSidewaysRollsWithTheTilt) {
   options.roll_error_deg = [](double, double h_deg) {
     return 2 * std::cos(3 * h_deg * std::acos(-1.0) / 180);
   };
-  expect_only_structure(options,
-                        {"h_deg", "geometry", "polynomial of degree 5, added to the base roll"});
+  expect_only_structure(options, {"h_deg", "geometry", "wave, added to the base roll"});
 }
 
 // Between two rings h rises and time passes: the time would have to jump just there.
