@@ -19,6 +19,7 @@
 #include "app/summary.h"
 #include "estimator/decision.h"
 #include "estimator/parallel_for.h"
+#include "estimator/quantization/interval_fit.h"
 
 namespace plumbline::app {
 
@@ -60,15 +61,16 @@ Result<void> check_responsive(const Calibration& calibration, const std::string&
 
 /// Of an output that mostly is beyond what its converter reads, the rest tells nothing.
 Result<void> check_on_scale(const CalibrationJob& job) {
-  const auto& adc = job.description.adc;
-  if (!adc) return {};
-  const double first_V = adc->min_V + 0.5 * adc->lsb_V(), last_V = adc->max_V - 1.5 * adc->lsb_V();
+  if (!job.description.adc) return {};
+  const CodeScale scale = scale_of(*job.description.adc);
+  const double half_V = 0.5 * scale.step_V;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const std::vector<double>& u_V = job.run.samples.u_V[axis];
     const auto is_off = [&](const Pose& pose) {
-      return std::all_of(u_V.begin() + static_cast<std::ptrdiff_t>(pose.first),
-                         u_V.begin() + static_cast<std::ptrdiff_t>(pose.first + pose.count),
-                         [&](double u) { return u < first_V || u > last_V; });
+      return std::all_of(
+          u_V.begin() + static_cast<std::ptrdiff_t>(pose.first),
+          u_V.begin() + static_cast<std::ptrdiff_t>(pose.first + pose.count),
+          [&](double u) { return u < scale.lowest_V + half_V || u > scale.highest_V - half_V; });
     };
     const auto off = std::count_if(job.run.poses.begin(), job.run.poses.end(), is_off);
     if (2 * off <= std::ssize(job.run.poses)) continue;

@@ -37,11 +37,11 @@ Eigen::VectorXd vector_of(const std::vector<double>& values) {
 }
 
 /// What one unit of anything may be worth to an axis at each visit: of bias, of any of its scale
-/// factors, of an angle of the head.
+/// factors, of an angle of the head. What δ turns is a component, too.
 Eigen::MatrixXd worth_of_unit(const VisitLog& log, std::size_t axis) {
   constexpr double kStep_rad = 1e-4;
   const auto i = static_cast<Eigen::Index>(axis);
-  Eigen::MatrixXd worth(std::ssize(log.visits), 1 + static_cast<int>(kAxisCount) + 3);
+  Eigen::MatrixXd worth(std::ssize(log.visits), 1 + static_cast<int>(kAxisCount) + 2);
   for (Eigen::Index k = 0; k < worth.rows(); ++k) {
     const Visit& visit = log.visits[static_cast<std::size_t>(k)];
     const HeadGeometry head{.delta_rad = visit.delta_rad, .h_rad = visit.h_rad};
@@ -51,8 +51,8 @@ Eigen::MatrixXd worth_of_unit(const VisitLog& log, std::size_t axis) {
       moved.*angle += kStep_rad;
       return (specific_force_g(moved, log.gamma)(i) - a_g(i)) / kStep_rad;
     };
-    worth.row(k) << 1, a_g.transpose(), by_angle(&HeadGeometry::delta_rad),
-        by_angle(&HeadGeometry::h_rad), by_angle(&HeadGeometry::roll_rad);
+    worth.row(k) << 1, a_g.transpose(), by_angle(&HeadGeometry::h_rad),
+        by_angle(&HeadGeometry::roll_rad);
   }
   return worth;
 }

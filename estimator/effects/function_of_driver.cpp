@@ -176,8 +176,9 @@ class HarmonicsOfPart final : public DrivenTerm {
     return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const int most = highest();
     std::vector<Hypothesis> starts;
-    for (int n = kFewestParts; is_seen(2 * n); ++n) add_parts(n, starts);
+    for (int n = kFewestParts; 2 * n <= most; ++n) add_parts(n, most, starts);
     return starts;
   }
   std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
@@ -185,7 +186,7 @@ class HarmonicsOfPart final : public DrivenTerm {
     std::vector<Hypothesis> starts;
     if (repeated.id() != "rig.delta_periodic" || found.size() < 2) return starts;
     const double n = std::min_element(found.begin(), found.end())->front();
-    add_parts(static_cast<int>(n), starts);
+    add_parts(static_cast<int>(n), highest(), starts);
     std::erase_if(starts, [&](const Hypothesis& start) {
       return !std::all_of(found.begin(), found.end(), [&](const std::vector<double>& harmonic) {
         const double order = harmonic.front() / n;
@@ -212,16 +213,16 @@ class HarmonicsOfPart final : public DrivenTerm {
   }
   /// Of the two amplitudes of an order among the parameters.
   static std::size_t place_of(int order) { return static_cast<std::size_t>(2 * order - 1); }
-  /// Positions at equal distances do not show a harmonic with less than two of them a period.
-  bool is_seen(int harmonic) const {
-    return harmonic <= kHighest && 2 * harmonic < effect::positions_of_a_turn(variable().value[0]);
+  /// Positions at equal distances do not show a harmonic with two of them a period or less.
+  int highest() const {
+    return std::min(kHighest, (effect::positions_of_a_turn(variable().value[0]) - 1) / 2);
   }
   /// The first few orders, or the first few that are odd: up and down alike.
-  void add_parts(int n, std::vector<Hypothesis>& starts) const {
+  void add_parts(int n, int most, std::vector<Hypothesis>& starts) const {
     for (const int step : {1, 2}) {
       Hypothesis start{std::vector<double>(parameters().size(), 0)};
       start.p[0] = n;
-      for (int order = 1; order <= kOrders && is_seen(n * order); order += step) {
+      for (int order = 1; order <= kOrders && n * order <= most; order += step) {
         for (const std::size_t k : {0U, 1U}) start.p[place_of(order) + k] = target().typical_size();
         if (order > 1) starts.push_back(start);
       }

@@ -9,62 +9,47 @@ namespace plumbline::sim {
 
 namespace {
 
+/// b times what a memory, that sees every instant, makes of it.
+template <class F>
+std::unique_ptr<Effect> remembering_term(const EffectContext& context, F f) {
+  class Term final : public Effect {
+   public:
+    Term(const EffectContext& p, F function)
+        : mask_(axis_mask(p.setting)), b_(p("b")), function_(std::move(function)) {}
+    void observe(const Moment& now) override { value_ = function_(now); }
+    double sensor_g(const Moment&, std::size_t axis) override {
+      return mask_[axis] ? b_ * value_ : 0.0;
+    }
+
+   private:
+    std::array<bool, 3> mask_;
+    double b_;
+    F function_;
+    double value_ = 0;
+  };
+  return std::make_unique<Term>(context, std::move(f));
+}
+
 /// Glue of the proof mass's frame: expands with temperature through a play, so that the bias on the
 /// way up differs from the bias on the way down.
-class ThermalHysteresis final : public Effect {
- public:
-  explicit ThermalHysteresis(const EffectContext& p)
-      : mask_(axis_mask(p.setting)), b_(p("b")), play_(p("width") / 2) {}
-  void observe(const Moment& now) override { offset_C_ = play_.next(now.temp_C) - now.temp_C; }
-  double sensor_g(const Moment&, std::size_t axis) override {
-    return mask_[axis] ? b_ * offset_C_ : 0.0;
-  }
-
- private:
-  std::array<bool, 3> mask_;
-  double b_;
-  Play play_;
-  double offset_C_ = 0;
-};
+std::unique_ptr<Effect> thermal_hysteresis(const EffectContext& p) {
+  return remembering_term(p, [play = Play(p("width") / 2)](const Moment& now) mutable {
+    return play.next(now.temp_C) - now.temp_C;
+  });
+}
 
 /// The same frame where the glue is all that holds it: the bias is where the play has drawn it.
-class ThermalDrag final : public Effect {
- public:
-  explicit ThermalDrag(const EffectContext& p)
-      : mask_(axis_mask(p.setting)),
-        b_(p("b")),
-        reference_C_(p.world.reference_C),
-        play_(p("width") / 2) {}
-  void observe(const Moment& now) override { drawn_C_ = play_.next(now.temp_C) - reference_C_; }
-  double sensor_g(const Moment&, std::size_t axis) override {
-    return mask_[axis] ? b_ * drawn_C_ : 0.0;
-  }
-
- private:
-  std::array<bool, 3> mask_;
-  double b_, reference_C_;
-  Play play_;
-  double drawn_C_ = 0;
-};
+std::unique_ptr<Effect> thermal_drag(const EffectContext& p) {
+  return remembering_term(p, [play = Play(p("width") / 2), t0 = p.world.reference_C](
+                                 const Moment& now) mutable { return play.next(now.temp_C) - t0; });
+}
 
 /// A housing that heats up from outside: while its temperature changes, a gradient bends it.
-class ThermalGradient final : public Effect {
- public:
-  explicit ThermalGradient(const EffectContext& p)
-      : mask_(axis_mask(p.setting)), b_(p("b")), core_(p("tau")) {}
-  void observe(const Moment& now) override {
-    gradient_C_ = now.temp_C - core_.next(now.temp_C, now.dt_s);
-  }
-  double sensor_g(const Moment&, std::size_t axis) override {
-    return mask_[axis] ? b_ * gradient_C_ : 0.0;
-  }
-
- private:
-  std::array<bool, 3> mask_;
-  double b_;
-  Lag core_;
-  double gradient_C_ = 0;
-};
+std::unique_ptr<Effect> thermal_gradient(const EffectContext& p) {
+  return remembering_term(p, [core = Lag(p("tau"))](const Moment& now) mutable {
+    return now.temp_C - core.next(now.temp_C, now.dt_s);
+  });
+}
 
 /// Suspension that remembers the load of the last minutes: every earlier pose counts, the longer
 /// ago the less.
@@ -140,21 +125,21 @@ const EffectInfo kOwnSensorEffects[] = {
      "bias",
      true,
      {{"b", "g/K"}, {.name = "width", .unit = "K", .min = 0}},
-     make<ThermalHysteresis>},
+     thermal_hysteresis},
     {"own.thermal_drag",
      "b*(play(T) - T0), play of the given width",
      "temp_C",
      "bias",
      true,
      {{"b", "g/K"}, {.name = "width", .unit = "K", .min = 0}},
-     make<ThermalDrag>},
+     thermal_drag},
     {"own.thermal_gradient",
      "b*(T - T lagged by tau)",
      "temp_C.rate",
      "bias",
      true,
      {{"b", "g/K"}, kTau},
-     make<ThermalGradient>},
+     thermal_gradient},
     {"own.creep",
      "c*(a_i lagged by tau - a_i)",
      "previous_pose",
