@@ -448,15 +448,16 @@ EnlargedParameters CandidateGains::linear_start(std::size_t place,
 }
 
 EnlargedFit fit_with_candidate(const FitInput& input, const CandidateGains& gains,
-                               std::size_t place, const Candidate& candidate, double promised) {
+                               std::size_t place, const Candidate& candidate, double promised,
+                               const FitLimits& limits) {
   constexpr double kMostOfIt = 0.95;
   const EnlargedFit& before = gains.fit();
   EnlargedFit with = fit_holding_shapes(input.log, input.observed, input.whitening,
                                         with_effect(before.parameters, candidate.active()),
-                                        before.parameters.effects.size());
+                                        before.parameters.effects.size(), limits);
   if (with.determined && before.chi2 - with.chi2 > kMostOfIt * promised) return with;
   EnlargedFit other = fit_enlarged(input.log, input.observed, input.whitening,
-                                   gains.linear_start(place, candidate));
+                                   gains.linear_start(place, candidate), limits);
   if (other.determined && (!with.determined || other.chi2 < with.chi2)) return other;
   return with;
 }

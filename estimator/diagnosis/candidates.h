@@ -152,6 +152,7 @@ struct FitInput {
 /// it; where a place or a time constant runs from there to where it explains less than `promised`
 /// to first order, also from where the linear problem puts it.
 EnlargedFit fit_with_candidate(const FitInput& input, const CandidateGains& gains,
-                               std::size_t place, const Candidate& candidate, double promised);
+                               std::size_t place, const Candidate& candidate, double promised,
+                               const FitLimits& limits = {});
 
 }  // namespace plumbline

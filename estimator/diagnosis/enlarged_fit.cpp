@@ -247,10 +247,11 @@ std::optional<Tangent> tangent_at(const VisitLog& log, const PoseWhitening& whit
 /// fit_enlarged() with the Jacobian of the rows that the model can move only.
 EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
                            const PoseWhitening& whitening, const EnlargedParameters& start,
-                           int most_iterations) {
+                           const FitLimits& limits) {
   // The last digits of a model that is far from the readings tell nothing: it is only compared.
   constexpr double kLastDigits = 1e-6, kShareOfExcess = 1e-5;
   constexpr double kMostOfASize = 10;  // by its uncertainty it might be many times what it is
+  constexpr double kStepsLikeIt = 20;  // that a fit may still take, in what the last one gained
   const Eigen::Index rows = moved_rows(log, start);
   const Eigen::VectorXd measured = stacked_V(observed);
   const auto whitened_residual = [&](const EnlargedParameters& parameters) -> Eigen::VectorXd {
@@ -262,7 +263,7 @@ EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
   const double unmoved_chi2 = fit.whitened_residual.tail(measured.size() - rows).squaredNorm();
   fit.chi2 = fit.whitened_residual.squaredNorm();
   EnlargedParameters tangent_of = start;
-  for (int iteration = 0; iteration < most_iterations && !fit.converged; ++iteration) {
+  for (int iteration = 0; iteration < limits.most_iterations && !fit.converged; ++iteration) {
     const std::optional<Tangent> tangent = tangent_at(log, whitening, fit);
     fit.determined = tangent.has_value();
     if (!tangent) return fit;
@@ -270,6 +271,7 @@ EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
     const Eigen::VectorXd& norms = tangent->norms;
     const Eigen::VectorXd step = tangent->qr.solve(fit.whitened_residual.head(rows));
     bool improved = false, refused = false;
+    double gained = 0;
     const auto try_step = [&](const Eigen::VectorXd& scaled_step, bool stopping_short) {
       EnlargedParameters trial = fit.parameters;
       trial.set_free_values(fit.parameters.free_values() + scaled_step.cwiseQuotient(norms));
@@ -282,8 +284,9 @@ EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
       const double chi2 = residual.squaredNorm() + unmoved_chi2;
       if (!(chi2 <= fit.chi2 * (1 + 1e-12))) return;
       improved = true;
+      gained = fit.chi2 - chi2;
       const double excess = std::max(0.0, chi2 - 2 * static_cast<double>(rows));
-      fit.converged = fit.chi2 - chi2 < kLastDigits + kShareOfExcess * excess;
+      fit.converged = gained < kLastDigits + kShareOfExcess * excess;
       fit.parameters = trial;
       fit.whitened_residual.head(rows) = residual;
       fit.chi2 = chi2;
@@ -294,6 +297,11 @@ EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
         try_step(share * step, stopping_short);
     };
     try_steps(false);
+    if (iteration > 0 && improved && fit.chi2 - kStepsLikeIt * gained > limits.chi2_of_interest) {
+      fit.given_up = true;
+      fit.determined = false;
+      return fit;
+    }
     if (!improved && refused) try_steps(true);
     if (!improved) {
       // Along what the readings hardly determine, the tangent leads nowhere: shorter there only
@@ -337,8 +345,8 @@ EnlargedFit fit_moved_rows(const VisitLog& log, const Observations& observed,
 
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start,
-                         int most_iterations) {
-  EnlargedFit fit = fit_moved_rows(log, observed, whitening, start, most_iterations);
+                         const FitLimits& limits) {
+  EnlargedFit fit = fit_moved_rows(log, observed, whitening, start, limits);
   const Eigen::Index rows = fit.whitened_jacobian.rows();
   fit.whitened_jacobian.conservativeResize(stacked_rows(log), Eigen::NoChange);
   fit.whitened_jacobian.bottomRows(stacked_rows(log) - rows).setZero();
@@ -347,13 +355,13 @@ EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
 
 EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
                                const PoseWhitening& whitening, const EnlargedParameters& start,
-                               std::size_t first_new) {
-  EnlargedFit fit = fit_enlarged(log, observed, whitening, start);
-  if (fit.determined) return fit;
+                               std::size_t first_new, const FitLimits& limits) {
+  EnlargedFit fit = fit_enlarged(log, observed, whitening, start, limits);
+  if (fit.determined || fit.given_up) return fit;
   EnlargedParameters held = fit.parameters;
   for (std::size_t e = first_new; e < held.effects.size(); ++e)
     held.effects[e] = with_shapes_held(held.effects[e]);
-  return fit_enlarged(log, observed, whitening, held);
+  return fit_enlarged(log, observed, whitening, held, limits);
 }
 
 EnlargedFit fit_from_levels(const VisitLog& log, const Observations& observed,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 
 #include "estimator/diagnosis/enlarged_model.h"
 
@@ -33,6 +34,7 @@ struct EnlargedFit : EnlargedEstimate {
   /// No direction of the free parameters is unobservable, the effects are no large differences of
   /// each other, and they neither leave a sensitivity open nor take its place.
   bool determined = true;
+  bool given_up = false;  ///< out of reach of FitLimits::chi2_of_interest, and not determined
 };
 
 /// Whether the sensitivity of each axis to its own direction is within a ratio of `most` of what it
@@ -49,20 +51,25 @@ bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, 
 /// standard uncertainty is `most` times what it is, or more.
 bool leaves_a_size_open(const EnlargedFit& fit, double most);
 
-/// Of a fit that is to settle.
-inline constexpr int kMostIterations = 20;
+/// How far a fit is taken.
+struct FitLimits {
+  int most_iterations = 20;  ///< as many as it takes to settle
+  /// A fit that settles far above this χ² is given up on the way: most of those that are made to
+  /// be compared are hopeless after two steps.
+  double chi2_of_interest = std::numeric_limits<double>::infinity();
+};
 
 /// Weighted nonlinear least squares from `start` (Gauss–Newton with step halving, orthogonal
 /// factorisation).
 EnlargedFit fit_enlarged(const VisitLog& log, const Observations& observed,
                          const PoseWhitening& whitening, const EnlargedParameters& start,
-                         int most_iterations = kMostIterations);
+                         const FitLimits& limits = {});
 
 /// The same; where that leaves something undetermined, the shapes of the effects from `first_new`
 /// on stay where they ended up: a boundary between two readings, say, that the visits do not place.
 EnlargedFit fit_holding_shapes(const VisitLog& log, const Observations& observed,
                                const PoseWhitening& whitening, const EnlargedParameters& start,
-                               std::size_t first_new);
+                               std::size_t first_new, const FitLimits& limits = {});
 
 /// The best of the same fits from several levels U_0 of the axis of the last effect, as far apart
 /// as the effect swings: what follows the codes hangs on the level more finely than the level is

@@ -85,25 +85,26 @@ bool take_back_each_other(const SearchModel& model, std::size_t first, std::size
   return (one + other).norm() < kMostLeft * std::min(one.norm(), other.norm());
 }
 
-/// The likeliest, and the likeliest of those with a name: to first order the response of a large
+/// The likeliest `most`, and as many of those with a name: to first order the response of a large
 /// effect falls behind functions without a name that happen to run like it.
-std::vector<Scored> worth_refining(const CandidateList& list, const std::vector<Scored>& ranked) {
-  constexpr std::size_t kMost = 4;
+std::vector<Scored> worth_refining(const CandidateList& list, const std::vector<Scored>& ranked,
+                                   std::size_t most) {
   std::vector<Scored> likeliest;
   std::size_t named = 0;
   for (const Scored& s : ranked) {
     const bool has_name = list.candidates[s.candidate].has_name();
-    if (likeliest.size() >= kMost && (!has_name || named >= kMost)) continue;
+    if (likeliest.size() >= most && (!has_name || named >= most)) continue;
     named += has_name ? 1 : 0;
     likeliest.push_back(s);
   }
   return likeliest;
 }
 
-/// What is worth its price in the place of a subset, likeliest first.
+/// What of the likeliest `most` is worth its price in the place of a subset, likeliest first.
 std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const CandidateResponses& responses,
-                                              const std::vector<std::size_t>& subset) {
+                                              const std::vector<std::size_t>& subset,
+                                              std::size_t most) {
   constexpr double kMayGain = 2, kOthersMayGain = 60;  // more than to first order, in χ²
   std::vector<SearchModel::Entry> exchanges;
   const EnlargedFit without = model.fit_without(subset);
@@ -114,7 +115,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   const CandidateGains gains(responses, without);
   const Eigen::VectorXd first_order = gains.of_residual();
   for (const Scored& scored :
-       worth_refining(model.list(), screen(model.list(), gains, first_order))) {
+       worth_refining(model.list(), screen(model.list(), gains, first_order), most)) {
     const std::size_t index = scored.candidate;
     const Candidate& candidate = model.list().candidates[index];
     const Candidate& replaced = model.candidate(subset.front());
@@ -124,11 +125,12 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     if (model.is_chosen_beside(subset, candidate)) continue;
     const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
     const double promised = first_order(static_cast<Eigen::Index>(index));
-    if (chi2_beside(model, candidate, without) - kMayGain * promised - kOthersMayGain +
-            model.price(index) >
-        now)
+    const double needed = now - model.price(index);
+    if (chi2_beside(model, candidate, without) - kMayGain * promised - kOthersMayGain > needed)
       continue;
-    const EnlargedFit with = model.fit_with(gains, index, candidate, promised);
+    const double at_start = without.chi2 - chi2_beside(model, candidate, without);
+    const EnlargedFit with =
+        model.fit_with(gains, index, candidate, promised, {.chi2_of_interest = needed + at_start});
     if (!with.determined) continue;
     const double cost = chi2_beside(model, candidate, with) + model.price_in(with, index);
     if (!(cost < now - kWorthExchanging)) continue;
@@ -167,10 +169,15 @@ std::vector<std::vector<std::size_t>> exchangeable(const SearchModel& model) {
 
 bool exchange_one(SearchModel& model) {
   const std::vector<std::vector<std::size_t>> subsets = exchangeable(model);
+  if (subsets.empty()) return false;
+  // Pairs grow with the square of the effects, and their fits with their parameters.
+  constexpr std::size_t kMost = 4, kMostInAll = 50;
+  const std::size_t most = std::clamp(kMostInAll / subsets.size(), std::size_t{1}, kMost);
   const CandidateResponses& responses = model.responses();
   std::vector<std::vector<SearchModel::Entry>> exchanges(subsets.size());
-  parallel_for(subsets.size(),
-               [&](std::size_t s) { exchanges[s] = exchanges_for(model, responses, subsets[s]); });
+  parallel_for(subsets.size(), [&](std::size_t s) {
+    exchanges[s] = exchanges_for(model, responses, subsets[s], most);
+  });
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     for (const SearchModel::Entry& with : exchanges[s])
       if (exchange_in_own_noise(model, subsets[s], {with}, 0)) return true;
@@ -313,7 +320,8 @@ struct Next {
 std::optional<Next> likeliest_beside(const SearchModel& model, const Some& some,
                                      const EnlargedFit& fit, std::size_t most, double gain) {
   constexpr std::size_t kMostRefined = 4;
-  constexpr double kLater = 2;  // what follows may gain more than what comes first
+  constexpr double kLater = 2;       // what follows may gain more than what comes first
+  constexpr double kFarBehind = 60;  // in χ²: no fewer parameters make up for it
   const CandidateGains gains(some.responses, fit);
   std::optional<Next> best;
   double best_score = std::numeric_limits<double>::infinity();
@@ -329,8 +337,10 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Some& some,
     if (model.is_certain(candidate) || (is_there && !candidate.effect->repeats())) continue;
     if (refined++ == kMostRefined) break;
     const std::size_t index = some.index[s.candidate];
+    FitLimits limits;
+    if (best) limits.chi2_of_interest = best->fit.chi2 + kFarBehind;
     EnlargedFit with = model.fit_with(gains, s.candidate, candidate,
-                                      first_order(static_cast<Eigen::Index>(s.candidate)));
+                                      first_order(static_cast<Eigen::Index>(s.candidate)), limits);
     if (!with.determined) continue;
     const double log_p = model.log_p_of(index, fit, with, s.dof);
     const double score = log_p + (s.score - s.log_p);

@@ -206,9 +206,10 @@ EnlargedFit SearchModel::fit_with(const EnlargedParameters& model,
 }
 
 EnlargedFit SearchModel::fit_with(const CandidateGains& gains, std::size_t place,
-                                  const Candidate& candidate, double promised) const {
+                                  const Candidate& candidate, double promised,
+                                  const FitLimits& limits) const {
   return fit_with_candidate({input().log, stage_.observed, stage_.whitening}, gains, place,
-                            candidate, promised);
+                            candidate, promised, limits);
 }
 
 EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) const {
@@ -281,10 +282,10 @@ EnlargedFit SearchModel::looked_closer(EnlargedFit fit) const {
   const std::vector<Hypothesis> closer =
       newcomer.effect->closer(input().log, newcomer.axis, {newcomer.p});
   std::vector<EnlargedFit> fits(closer.size());
-  const auto fit_all = [&](int most_iterations) {
+  const auto fit_all = [&](const FitLimits& limits) {
     parallel_for(fits.size(), [&](std::size_t k) {
-      fits[k] = fit_enlarged(input().log, stage_.observed, stage_.whitening, fits[k].parameters,
-                             most_iterations);
+      fits[k] =
+          fit_enlarged(input().log, stage_.observed, stage_.whitening, fits[k].parameters, limits);
     });
   };
   for (std::size_t k = 0; k < closer.size(); ++k) {
@@ -295,13 +296,13 @@ EnlargedFit SearchModel::looked_closer(EnlargedFit fit) const {
   constexpr std::size_t kFew = 8;
   if (fits.size() > kFew) {
     constexpr int kFirstLook = 2;
-    fit_all(kFirstLook);
+    fit_all({.most_iterations = kFirstLook});
     std::erase_if(fits, [](const EnlargedFit& with) { return !with.determined; });
     std::stable_sort(fits.begin(), fits.end(),
                      [](const EnlargedFit& a, const EnlargedFit& b) { return a.chi2 < b.chi2; });
     fits.resize(std::min(fits.size(), kFew));
   }
-  fit_all(kMostIterations);
+  fit_all({.chi2_of_interest = fit.chi2 - kClearly});
   EnlargedFit* best = nullptr;
   for (EnlargedFit& with : fits)
     if (with.determined && with.chi2 < fit.chi2 - kClearly &&

@@ -73,7 +73,7 @@ class SearchModel {
   /// candidate (as fit_with_candidate()), of this one without some of its effects (ascending).
   EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const;
   EnlargedFit fit_with(const CandidateGains& gains, std::size_t place, const Candidate& candidate,
-                       double promised) const;
+                       double promised, const FitLimits& limits = {}) const;
   EnlargedFit fit_without(const std::vector<std::size_t>& effects) const;
   /// Such a fit with one of those close to its last effect (Effect::closer()) in its place, where
   /// that explains clearly more.

@@ -242,7 +242,7 @@ Driver component_before(const VisitLog& log) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const std::vector<double> a_g = specific_force_component_g(log, i);
     for (std::size_t k = 0; k < a_g.size(); ++k)
-      driver.value[i].push_back(log.before(k) ? a_g[k - 1] : 0.0);
+      driver.value[i].push_back(log.before(k) ? a_g[k - 1] : a_g[k]);  // as if it had not moved
   }
   driver.span = about_zero(driver.value);
   driver.reference = 0;
