@@ -106,12 +106,17 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                                               const std::vector<std::size_t>& subset,
                                               std::size_t most) {
   constexpr double kMayGain = 2, kOthersMayGain = 60;  // more than to first order, in χ²
+  constexpr double kNearEnough = 0.5;                  // of what the subset explains
   std::vector<SearchModel::Entry> exchanges;
   const EnlargedFit without = model.fit_without(subset);
   if (!without.determined) return exchanges;
   const bool two_for_one =
       subset.size() == 2 && take_back_each_other(model, subset.front(), subset.back());
-  const double spent = model.price_of(subset) + (two_for_one ? 2 * kHandicapOfUnnamed : 0);
+  const double spent = model.price_of(subset) + (two_for_one ? 2 * kHandicapOfUnnamed : 0) +
+                       kOfForty * further_names(model, subset);
+  EnlargedParameters others = model.stage().fit.parameters;
+  for (auto k = subset.rbegin(); k != subset.rend(); ++k)
+    others = without_effect(std::move(others), *k);
   const CandidateGains gains(responses, without);
   const Eigen::VectorXd first_order = gains.of_residual();
   for (const Scored& scored :
@@ -129,8 +134,16 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     if (chi2_beside(model, candidate, without) - kMayGain * promised - kOthersMayGain > needed)
       continue;
     const double at_start = without.chi2 - chi2_beside(model, candidate, without);
-    const EnlargedFit with =
-        model.fit_with(gains, index, candidate, promised, {.chi2_of_interest = needed + at_start});
+    const FitLimits limits{.chi2_of_interest = needed + at_start};
+    // The shapes of the others may have run away beside the gap, from where they do not come back.
+    EnlargedFit with = model.fit_with(others, candidate.active(), limits);
+    if (!with.determined || with.chi2 > limits.chi2_of_interest)
+      with = model.fit_with(gains, index, candidate, promised, limits);
+    // What several make up for where they are, a single one has yet to find.
+    const double left = with.chi2 - model.stage().fit.chi2;
+    if (subset.size() > 1 && with.chi2 > limits.chi2_of_interest &&
+        left < kNearEnough * (without.chi2 - model.stage().fit.chi2))
+      with = model.looked_closer(std::move(with));
     if (!with.determined) continue;
     const double cost = chi2_beside(model, candidate, with) + model.price_in(with, index);
     if (!(cost < now - kWorthExchanging)) continue;
@@ -171,12 +184,13 @@ bool exchange_one(SearchModel& model) {
   const std::vector<std::vector<std::size_t>> subsets = exchangeable(model);
   if (subsets.empty()) return false;
   // Pairs grow with the square of the effects, and their fits with their parameters.
-  constexpr std::size_t kMost = 4, kMostInAll = 50;
+  constexpr std::size_t kMost = 4, kMostInAll = 50, kMostOfAxis = 12;
   const std::size_t most = std::clamp(kMostInAll / subsets.size(), std::size_t{1}, kMost);
   const CandidateResponses& responses = model.responses();
   std::vector<std::vector<SearchModel::Entry>> exchanges(subsets.size());
   parallel_for(subsets.size(), [&](std::size_t s) {
-    exchanges[s] = exchanges_for(model, responses, subsets[s], most);
+    exchanges[s] =
+        exchanges_for(model, responses, subsets[s], subsets[s].size() > 2 ? kMostOfAxis : most);
   });
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     for (const SearchModel::Entry& with : exchanges[s])

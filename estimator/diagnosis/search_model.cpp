@@ -199,10 +199,10 @@ double SearchModel::log_p_of(std::size_t candidate, const EnlargedFit& before,
   return log_chi_squared_tail(sum, 2.0 * kAxisCount);
 }
 
-EnlargedFit SearchModel::fit_with(const EnlargedParameters& model,
-                                  const ActiveEffect& active) const {
+EnlargedFit SearchModel::fit_with(const EnlargedParameters& model, const ActiveEffect& active,
+                                  const FitLimits& limits) const {
   return fit_holding_shapes(input().log, stage_.observed, stage_.whitening,
-                            with_effect(model, active), model.effects.size());
+                            with_effect(model, active), model.effects.size(), limits);
 }
 
 EnlargedFit SearchModel::fit_with(const CandidateGains& gains, std::size_t place,
@@ -277,6 +277,16 @@ void SearchModel::forget(std::size_t effect) {
 }
 
 EnlargedFit SearchModel::looked_closer(EnlargedFit fit) const {
+  constexpr int kMostMoves = 6;
+  for (int moves = 0; moves < kMostMoves; ++moves) {
+    std::optional<EnlargedFit> closer = closer_to(fit);
+    if (!closer) break;
+    fit = *std::move(closer);
+  }
+  return fit;
+}
+
+std::optional<EnlargedFit> SearchModel::closer_to(const EnlargedFit& fit) const {
   constexpr double kClearly = 10;
   const ActiveEffect& newcomer = fit.parameters.effects.back();
   const std::vector<Hypothesis> closer =
@@ -303,12 +313,11 @@ EnlargedFit SearchModel::looked_closer(EnlargedFit fit) const {
     fits.resize(std::min(fits.size(), kFew));
   }
   fit_all({.chi2_of_interest = fit.chi2 - kClearly});
-  EnlargedFit* best = nullptr;
+  std::optional<EnlargedFit> best;
   for (EnlargedFit& with : fits)
-    if (with.determined && with.chi2 < fit.chi2 - kClearly &&
-        (best == nullptr || with.chi2 < best->chi2))
-      best = &with;
-  return best != nullptr ? std::move(*best) : std::move(fit);
+    if (with.determined && with.chi2 < fit.chi2 - kClearly && (!best || with.chi2 < best->chi2))
+      best = std::move(with);
+  return best;
 }
 
 void SearchModel::look_closer() {

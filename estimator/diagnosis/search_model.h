@@ -71,12 +71,13 @@ class SearchModel {
 
   /// Fits with the noise as it stands: of a model with one more effect, of one with one more
   /// candidate (as fit_with_candidate()), of this one without some of its effects (ascending).
-  EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active) const;
+  EnlargedFit fit_with(const EnlargedParameters& model, const ActiveEffect& active,
+                       const FitLimits& limits = {}) const;
   EnlargedFit fit_with(const CandidateGains& gains, std::size_t place, const Candidate& candidate,
                        double promised, const FitLimits& limits = {}) const;
   EnlargedFit fit_without(const std::vector<std::size_t>& effects) const;
   /// Such a fit with one of those close to its last effect (Effect::closer()) in its place, where
-  /// that explains clearly more.
+  /// that explains clearly more; and so on from there.
   EnlargedFit looked_closer(EnlargedFit fit) const;
   /// A candidate that may come into the model, and the model with it.
   struct Entry {
@@ -107,6 +108,7 @@ class SearchModel {
 
  private:
   bool adopt(const EnlargedParameters& parameters);
+  std::optional<EnlargedFit> closer_to(const EnlargedFit& fit) const;
   void look_closer();
   void leave_ties_open();
   void forget(std::size_t effect);

@@ -97,24 +97,36 @@ class Window final : public DrivenTerm {
             effect::instant("to"),
             {"p", target().unit(), ParameterRole::amplitude}};
   }
-  /// Few: two steps that cancel, or a train, lead to all others.
+  /// Few where two steps that cancel, or a train, lead to all others.
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
-    const double width = 0.15 * (high - low);
     std::vector<Hypothesis> starts;
-    for (double from = low; from + width < high; from += 0.5 * width)
-      starts.push_back(half_way(from, from + width, target().typical_size()));
+    const auto add_all = [&](double width, double spacing) {
+      for (double from = low; from + width < high; from += spacing)
+        starts.push_back(half_way(from, from + width, target().typical_size()));
+    };
+    const double span = high - low;
+    if (target().form == TermForm::bias)
+      add_all(0.15 * span, 0.075 * span);
+    else
+      for (const double share : {0.08, 0.15, 0.27, 0.45})
+        add_all(share * span, 0.25 * share * span);
     return starts;
   }
   std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
                                  const Hypothesis& found) const override {
-    constexpr int kPlaces = 4;
     const double spacing = 4 * part_of_spacing();
     std::vector<Hypothesis> others;
-    for (int from = -kPlaces; from <= kPlaces; ++from)
-      for (int to = -kPlaces; to <= kPlaces; ++to)
-        others.push_back(
-            half_way(found.p[0] + spacing * from, found.p[1] + spacing * to, found.p[2]));
+    const auto add_moved = [&](double from, double to) {
+      if (from > range().first && to < range().second && from < to)
+        others.push_back(half_way(from, to, found.p[2]));
+    };
+    for (const int visits : {1, 2, 4, 8, 16, 32, 64})
+      for (const double move : {-spacing * visits, spacing * visits}) {
+        add_moved(found.p[0] + move, found.p[1]);
+        add_moved(found.p[0], found.p[1] + move);
+        add_moved(found.p[0] + move, found.p[1] + move);
+      }
     return others;
   }
   /// A step and one back, or a train of which the run saw one pulse.

@@ -32,7 +32,7 @@ EnlargedParameters truth_of(const SyntheticRun& data) {
 
 // Two waves of the x axis in the time, of so many cycles in the run each, fitted with their periods
 // held to readings that hold the sum of two waves of 3 and of 5 cycles.
-EnlargedFit fit_of_two_waves(double cycles, double other_cycles) {
+EnlargedFit fit_of_two_waves(double cycles, double other_cycles, const FitLimits& limits = {}) {
   SyntheticRun data = synthetic_run(3, kSixteenBits);
   const VisitLog log = make_visit_log(data.run, data.description);
   Observations observed = observe(data.run, log);
@@ -51,7 +51,16 @@ EnlargedFit fit_of_two_waves(double cycles, double other_cycles) {
     start = with_effect(
         std::move(start),
         with_shapes_held(activate(*wave_in_time, 0, {{t_s.front(), span_s / each, 1e-3, 1e-3}})));
-  return fit_enlarged(log, observed, white_noise(log), start);
+  return fit_enlarged(log, observed, white_noise(log), start, limits);
+}
+
+TEST(EnlargedFit, IsGivenUpWhereItStaysFarAboveWhatIsOfInterest) {
+  const EnlargedFit of_both = fit_of_two_waves(3, 5);
+  const FitLimits limits{.chi2_of_interest = of_both.chi2 + 1};
+  EXPECT_EQ(fit_of_two_waves(3, 5, limits).chi2, of_both.chi2);
+  const EnlargedFit of_one = fit_of_two_waves(4, 5, limits);
+  EXPECT_TRUE(of_one.given_up);
+  EXPECT_FALSE(of_one.determined);
 }
 
 TEST(EnlargedFit, IsNotDeterminedWhereEffectsAreLargeDifferencesOfEachOther) {

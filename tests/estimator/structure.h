@@ -1,0 +1,38 @@
+// What has no name, of a synthetic run: that it is told as one, and by what.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "estimator/calibrate.h"
+#include "tests/estimator/synthetic_run.h"
+
+namespace plumbline {
+
+struct Structure {
+  const char* driver;
+  const char* form;
+  const char* shape;
+};
+
+/// The only finding there is, which it expects to be this one and to leave next to noise.
+inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
+                                               const Structure& expected) {
+  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, testing::IsEmpty());
+  EXPECT_EQ(result.diagnosis.unlisted.size(), 1U);
+  if (result.diagnosis.unlisted.empty()) return {};
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, expected.driver);
+  EXPECT_EQ(found.form, expected.form);
+  EXPECT_EQ(found.shape, expected.shape);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    EXPECT_GT(result.floor_pose_rms_mps2[i], 0);
+    EXPECT_LT(result.after.heldout_pose_rms_mps2[i], 1.3 * result.floor_pose_rms_mps2[i]);
+  }
+  return found;
+}
+
+}  // namespace plumbline
