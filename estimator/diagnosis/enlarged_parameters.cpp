@@ -93,6 +93,13 @@ EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect) 
   return model;
 }
 
+EnlargedParameters without_effects(EnlargedParameters model,
+                                   const std::vector<std::size_t>& effects) {
+  for (auto k = effects.rbegin(); k != effects.rend(); ++k)
+    model = without_effect(std::move(model), *k);
+  return model;
+}
+
 bool has_effect_within_dwell(const EnlargedParameters& parameters) {
   return std::any_of(parameters.effects.begin(), parameters.effects.end(),
                      [](const ActiveEffect& active) { return active.effect->within_dwell(); });

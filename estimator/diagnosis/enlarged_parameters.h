@@ -45,9 +45,11 @@ struct EnlargedParameters {
 /// Whether it is an effect of the sensor of that axis.
 bool is_of_sensor(const ActiveEffect& active, std::size_t axis);
 
-/// The model with one more effect; without that of an index.
+/// The model with one more effect; without that of an index; without those of several (ascending).
 EnlargedParameters with_effect(EnlargedParameters model, const ActiveEffect& active);
 EnlargedParameters without_effect(EnlargedParameters model, std::size_t effect);
+EnlargedParameters without_effects(EnlargedParameters model,
+                                   const std::vector<std::size_t>& effects);
 
 /// Whether the model has effects that change while the head rests: only then are the rows of the
 /// dwells anything but zero.

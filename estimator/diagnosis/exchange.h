@@ -3,10 +3,20 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "estimator/diagnosis/search_model.h"
 
 namespace plumbline {
+
+/// By how much what takes another's place must be cheaper, in χ².
+inline constexpr double kWorthExchanging = 2;
+
+/// Exchanges effects for others, and drops what that makes superfluous, unless slow noise would
+/// have to take up what the others leave: the noise as it stands was estimated beside what is to
+/// go. `more_names`: by how many the newcomers have more than the others. Whether it did.
+bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& effects,
+                           const std::vector<SearchModel::Entry>& with, double more_names);
 
 /// Replaces one of the model's effects, or two, by a single one that explains as much for less.
 /// Whether there was one.
@@ -17,13 +27,8 @@ bool exchange_one(SearchModel& model);
 /// doing. Whether there were any.
 bool exchange_for_one_kind(SearchModel& model);
 
-/// What has no name gives way to effects that have one, as many as it takes, where these are worth
-/// their price: two of them together may have looked like one structure. What moves the head and
-/// has no name gives way to less of the same beside one with a name, too. Whether anything did.
-bool name_unlisted(SearchModel& model);
-
-/// The same for effect k where it is slow and there is slow noise: the rivals are compared each
-/// with the noise that suits it.
+/// The same of effect k alone where it is slow and there is slow noise: the rivals are compared
+/// each with the noise that suits it.
 bool exchange_slow(SearchModel& model, std::size_t k);
 
 }  // namespace plumbline

@@ -5,10 +5,12 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/exchange.h"
+#include "estimator/diagnosis/naming.h"
 #include "estimator/diagnosis/repetition.h"
 #include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/search_model.h"
@@ -39,18 +41,20 @@ class Search {
   }
 
  private:
-  void explain_residual() {
-    grow();
+  /// False where it came to what another way had come to before: from there on they are one.
+  bool explain_residual() {
+    if (!grow()) return false;
     constexpr int kMostNamings = 3;
     for (int k = 0; k < kMostNamings && name_unlisted(model_); ++k) {
       model_.drop_superfluous();
-      grow();
+      if (!grow()) return false;
     }
     constexpr int kMostExchanges = 4;
     for (int k = 0; k < kMostExchanges && (exchange_for_one_kind(model_) || exchange_one(model_));
          ++k)
       model_.drop_superfluous();
     model_.drop_what_excess_explains();
+    return true;
   }
 
   /// What comes first may stand for something else, and functions without a name then make up for
@@ -84,6 +88,7 @@ class Search {
     constexpr PerAxis<bool> kAll{true, true, true};
     const SearchModel before = std::exchange(model_, start);
     const double p_before = p_best_rest_;
+    passed_before_.merge(passed_);
     model_.set_looks(before.looks());
     const Candidate& candidate = list_.candidates[first];
     const ActiveEffect active = candidate.active();
@@ -92,11 +97,10 @@ class Search {
     if (with.determined) {
       const double log_p =
           model_.log_p_of(first, alone, with, static_cast<int>(active.free_count()));
-      if (model_.add({first, model_.p_of(candidate, log_p), with.parameters})) {
-        explain_residual();
-        if (model_.cost(before.stage(), kAll) < before.cost(before.stage(), kAll) - kClearly)
-          return;
-      }
+      if (model_.add({first, model_.p_of(candidate, log_p), with.parameters}) &&
+          explain_residual() &&
+          model_.cost(before.stage(), kAll) < before.cost(before.stage(), kAll) - kClearly)
+        return;
     }
     model_ = before;
     p_best_rest_ = p_before;
@@ -128,8 +132,8 @@ class Search {
       model_ = with;
   }
 
-  /// One effect after the other, until nothing is found.
-  void grow() {
+  /// One effect after the other, until nothing is found. False as explain_residual().
+  bool grow() {
     // Where the best of the slow ones is superfluous as soon as it is there, so are the others.
     bool worth_slow_look = true;
     // A train that takes the place of another could be followed by that again.
@@ -140,6 +144,8 @@ class Search {
     constexpr int kMostReturns = 3;
     std::map<std::vector<std::size_t>, int> returns;
     while (model_.size() < options_.max_effects && returns[families()]++ <= kMostReturns) {
+      if (passed_before_.contains(families())) return false;
+      passed_.insert(families());
       const std::size_t before = model_.size();
       const bool found = add_one();
       if (!found && !(worth_slow_look && add_slow_one()) &&
@@ -150,6 +156,7 @@ class Search {
       tell_in_one(model_);
       if (!found) worth_slow_look = model_.size() > before;
     }
+    return true;
   }
 
   /// Of the effects in the model, in ascending order.
@@ -358,6 +365,8 @@ class Search {
   const SearchOptions& options_;
   SearchModel model_;
   double p_best_rest_ = 1;
+  /// Families of the models that the search has come through, on this way and on those before.
+  std::set<std::vector<std::size_t>> passed_, passed_before_;
 };
 
 }  // namespace

@@ -213,11 +213,9 @@ EnlargedFit SearchModel::fit_with(const CandidateGains& gains, std::size_t place
 }
 
 EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) const {
-  EnlargedParameters fewer = stage_.fit.parameters;
-  for (auto k = effects.rbegin(); k != effects.rend(); ++k)
-    fewer = without_effect(std::move(fewer), *k);
   // What is missing may drive the shapes of the others to where they change nothing.
-  return fit_holding_shapes(input().log, stage_.observed, stage_.whitening, fewer, 0);
+  return fit_holding_shapes(input().log, stage_.observed, stage_.whitening,
+                            without_effects(stage_.fit.parameters, effects), 0);
 }
 
 bool SearchModel::adopt(const EnlargedParameters& parameters) {

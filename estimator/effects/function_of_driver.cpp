@@ -302,9 +302,15 @@ class Power final : public DrivenTerm {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
+    // What began when the clock did may not have waited for the first pose.
+    constexpr double kSoonAfter = 0.1;  // as a share of the run
+    std::vector<double> beginnings = {low};
+    if (variable().is_clock() && low > 0 && low < kSoonAfter * (high - low))
+      beginnings.push_back(0);
     std::vector<Hypothesis> starts;
-    for (const double power : {0.5, 2.0})
-      starts.push_back({{low, high, power, target().typical_size()}});
+    for (const double beginning : beginnings)
+      for (const double power : {0.5, 2.0})
+        starts.push_back({{beginning, high, power, target().typical_size()}});
     return starts;
   }
 

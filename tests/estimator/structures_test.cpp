@@ -45,6 +45,18 @@ TEST(Structure, WhatDiffusesGrowsWithTheRootOfTheTime) {
   expect_only_structure(options, {"t_s", "bias", "power"});
 }
 
+// The first poses tell when it began: a warm-up would make up for what they have come by then.
+TEST(Structure, WhatDiffusesMayHaveBegunWithTheClock) {
+  SyntheticOptions options;
+  options.still_s = 4;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[2] = [](const auto&, double t_s) { return 5e-4 * std::sqrt(t_s); };
+  const UnlistedStructure found = expect_only_structure(options, {"t_s", "bias", "power"});
+  ASSERT_FALSE(found.parameters.empty());
+  EXPECT_EQ(found.parameters.front().value, 0);
+}
+
 // As a cubic it left remnants that other effects were named for.
 TEST(Structure, AnEndThatIsReachedGraduallyIsAWideStep) {
   SyntheticOptions options;
