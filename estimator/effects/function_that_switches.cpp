@@ -99,7 +99,7 @@ class Window final : public DrivenTerm {
   }
   /// Few where two steps that cancel, or a train, lead to all others.
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    const auto [low, high] = range();
+    const double low = range().first, high = range().second;
     std::vector<Hypothesis> starts;
     const auto add_all = [&](double width, double spacing) {
       for (double from = low; from + width < high; from += spacing)
