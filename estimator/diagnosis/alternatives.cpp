@@ -159,13 +159,13 @@ struct Vacancy {
 
 /// Those that do as well as what was found, one of each name, most likely first.
 std::vector<Alternative> that_do_as_well(const Vacancy& vacancy, const std::vector<Rival>& rivals) {
+  const Eigen::Index fewest = vacancy.result.fit.parameters.free_count();
+  const FitLimits limits{.chi2_of_interest = vacancy.without.chi2 - vacancy.needed(fewest)};
   std::vector<EnlargedFit> fits(rivals.size());
   parallel_for(fits.size(), [&](std::size_t k) {
     const auto& [candidate, gain] = rivals[k];
-    const Eigen::Index fewest = vacancy.result.fit.parameters.free_count();
-    fits[k] = fit_with_candidate(
-        vacancy.fit_input, vacancy.gains, candidate, vacancy.list.candidates[candidate], gain,
-        {.chi2_of_interest = vacancy.without.chi2 - vacancy.needed(fewest)});
+    fits[k] = fit_with_candidate(vacancy.fit_input, vacancy.gains, candidate,
+                                 vacancy.list.candidates[candidate], gain, limits);
   });
   std::vector<Alternative> alternatives;
   for (std::size_t k = 0; k < fits.size(); ++k) {

@@ -125,9 +125,9 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
     const double now = chi2_beside(model, candidate, model.stage().fit) + spent;
     const double promised = first_order(static_cast<Eigen::Index>(index));
     const double needed = now - model.price(index);
-    if (chi2_beside(model, candidate, without) - kMayGain * promised - kOthersMayGain > needed)
-      continue;
-    const double at_start = without.chi2 - chi2_beside(model, candidate, without);
+    const double left_out = chi2_beside(model, candidate, without);
+    if (left_out - kMayGain * promised - kOthersMayGain > needed) continue;
+    const double at_start = without.chi2 - left_out;
     const FitLimits limits{.chi2_of_interest = needed + at_start};
     // The shapes of the others may have run away beside the gap, from where they do not come back.
     EnlargedFit with = model.fit_with(others, candidate.active(), limits);

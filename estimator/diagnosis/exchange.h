@@ -18,7 +18,8 @@ inline constexpr double kWorthExchanging = 2;
 bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& effects,
                            const std::vector<SearchModel::Entry>& with, double more_names);
 
-/// Replaces one of the model's effects, or two, by a single one that explains as much for less.
+/// Replaces one of the model's effects, two, or all of an axis, by a single one that explains as
+/// much for less.
 /// Whether there was one.
 bool exchange_one(SearchModel& model);
 
@@ -27,8 +28,8 @@ bool exchange_one(SearchModel& model);
 /// doing. Whether there were any.
 bool exchange_for_one_kind(SearchModel& model);
 
-/// The same of effect k alone where it is slow and there is slow noise: the rivals are compared
-/// each with the noise that suits it.
+/// As exchange_one(), of effect k alone, where it is slow and there is slow noise: the rivals are
+/// compared each with the noise that suits it.
 bool exchange_slow(SearchModel& model, std::size_t k);
 
 }  // namespace plumbline
