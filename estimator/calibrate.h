@@ -257,8 +257,9 @@ struct Calibration {
   double schwarz_criterion = 0;
 };
 
-/// Identifies the noise, estimates the 12 parameters in three ways, tests the residual, decides.
-/// Deterministic in input and options.seed. Preconditions: every pose has at least one sample.
+/// Identifies the noise, estimates the 12 parameters in three ways, tests the residual, searches it
+/// for what the model lacks and adds that, decides. Deterministic in input and options.seed.
+/// Preconditions: there are poses, each with angles and with at least one sample.
 Calibration calibrate(const CalibrationInput& input, const CalibrationOptions& options);
 
 /// Errors of a calibrated model on an independent set of the same unit.

@@ -74,6 +74,13 @@ double samples_per_pose(const MeasurementSet& run) {
   return static_cast<double>(run.samples.size()) / static_cast<double>(run.poses.size());
 }
 
+Eigen::VectorXd readings_of_poses(const MeasurementSet& run) {
+  Eigen::VectorXd readings(std::ssize(run.poses));
+  for (Eigen::Index k = 0; k < readings.size(); ++k)
+    readings(k) = static_cast<double>(run.poses[static_cast<std::size_t>(k)].count);
+  return readings;
+}
+
 /// White noise of one reading: within the dwells, or in the record when every pose is read once;
 /// negative when nothing tells.
 double white_noise_V(const CalibrationInput& input, std::size_t axis) {
@@ -164,7 +171,7 @@ AxisWork fit_axis(const Experiment& experiment, const NoiseModel& identified, st
   if (experiment.input.description.adc && experiment.white_V[axis] >= 0) {
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
       free = free_of_rounding(mean_V, expected_V, scale_of(*experiment.input.description.adc),
-                              experiment.white_V[axis], samples_per_pose(experiment.input.run),
+                              experiment.white_V[axis], readings_of_poses(experiment.input.run),
                               experiment.line_V2[axis]);
       work.y = free.mean_V;
       // Where the steps keep their edges, few means say more than the others together.

@@ -63,7 +63,8 @@ Applied apply(const CertifiedModel& model, const MeasurementSet& set, VisitLog l
       const EvaluationFigures otherwise = with(restored.parameters);
       if (square_mps2(otherwise) < square_mps2(best.figures)) {
         best.figures = otherwise;
-        best.decided_otherwise = {active.effect->id()};
+        if (best.decided_otherwise.empty() || best.decided_otherwise.back() != active.effect->id())
+          best.decided_otherwise.push_back(active.effect->id());
       } else {
         active.p = found;
       }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <span>
 
 #include "estimator/effects/code_evidence.h"
@@ -33,11 +34,10 @@ Group group_of(const std::vector<double>& readings, std::size_t first, std::size
   return group;
 }
 
-enum class Position { first, inside, last };
 struct Suspect {
   OutlyingReading reading;
-  Position position = Position::inside;
-  double from = 0;  ///< the median of its group
+  std::size_t after_first = 0, before_last = 0;  ///< readings of its group
+  double from = 0;                               ///< the median of its group
   bool is_above = false;
 };
 
@@ -49,24 +49,26 @@ void add_suspects(const Group& group, double far, std::vector<Suspect>& suspects
     if (off(k) <= far) continue;
     if ((k > 0 && off(k - 1) > 0.5 * off(k)) || (k < last && off(k + 1) > 0.5 * off(k))) continue;
     suspects.push_back({{group.first + k, group.first + (k > 0 ? k - 1 : k + 1)},
-                        k == 0      ? Position::first
-                        : k == last ? Position::last
-                                    : Position::inside,
+                        k,
+                        last - k,
                         group.median,
                         group.reading[k] > group.median});
   }
 }
 
-/// What happens at one end of the dwells happens there for a reason.
-void leave_what_belongs_to_moves(std::vector<Suspect>& suspects) {
-  const auto count = [&](Position position) {
-    return std::count_if(suspects.begin(), suspects.end(),
-                         [=](const Suspect& s) { return s.position == position; });
-  };
-  const auto by_chance = 1 + count(Position::inside) / 4;
-  for (const Position end : {Position::first, Position::last})
-    if (count(end) > by_chance)
-      std::erase_if(suspects, [=](const Suspect& s) { return s.position == end; });
+/// What happens so long after arrival, or before the head leaves, again and again, happens there
+/// for a reason.
+void leave_what_belongs_to_dwells(std::vector<Suspect>& suspects) {
+  for (const auto place : {&Suspect::after_first, &Suspect::before_last}) {
+    std::map<std::size_t, std::size_t> count;
+    for (const Suspect& suspect : suspects) ++count[suspect.*place];
+    const std::size_t all = suspects.size();
+    std::erase_if(suspects, [&](const Suspect& suspect) {
+      const std::size_t here = count[suspect.*place];
+      const std::size_t by_chance = suspect.*place == 0 ? 1 : 2;
+      return here > by_chance + (all - here) / 4;
+    });
+  }
 }
 
 /// Whether most of those to one side begin within so little of one voltage: noise carries readings
@@ -111,7 +113,7 @@ std::vector<OutlyingReading> outlying_readings(const MeasurementSet& set, std::s
   const double sd_V = std::max(median(sds), kFewestSteps / kFar * step_V);
   std::vector<Suspect> suspects;
   for (const Group& dwell : dwells) add_suspects(dwell, kFar * std::max(dwell.sd, sd_V), suspects);
-  leave_what_belongs_to_moves(suspects);
+  leave_what_belongs_to_dwells(suspects);
   if (suspects.empty() ||
       static_cast<double>(suspects.size()) > kMostShare * static_cast<double>(readings.size()) ||
       begin_at_one_voltage(suspects, kNearEdge * sd_V) ||

@@ -13,7 +13,7 @@ namespace {
 
 // Odds of 100 to 1: twice the logarithm of it.
 constexpr double kIndistinguishable = 9.2;
-// What a further parameter must gain to be worth naming; about 2·ln of the number of poses.
+// What a further parameter must gain to be worth naming; Schwarz: ln of the number of poses.
 constexpr double kPricePerParameter = 6;
 constexpr std::size_t kLongestSum = 3;
 constexpr std::size_t kRivalsRefined = 16;

@@ -165,7 +165,8 @@ void add_head_response(const Baseline& base, const SingleAmplitude& single,
     if (single.number.empty())
       effect.displace(base.log, visit, single.active.p.data(), head);
     else
-      effect.displace_by_number(base.log, visit, single.number[visit], head);
+      effect.displace_by_number(base.log, visit, single.number[visit], single.active.p.data(),
+                                head);
     if (head == base.head[visit]) continue;  // most candidates concern few visits
     const Eigen::Vector3d moved = specific_force_g(head, base.log.gamma) - base.a_g[visit];
     for (std::size_t i = 0; i < kAxisCount; ++i)

@@ -43,7 +43,8 @@ void fit(EdgeComb& train, const Comb& up, const Comb& down, const Eigen::VectorX
   train.gain = train.size * product;
 }
 
-/// Moves the edges as long as that explains more, by less than the distance between steps.
+/// Moves the edges as long as that explains more, each time by less than the distance between
+/// steps.
 EdgeComb refined(EdgeComb train, const std::vector<double>& at_s, const Eigen::VectorXd& products,
                  const Eigen::MatrixXd& gram, double distance_s) {
   const double cycles = (at_s.back() - at_s.front()) / train.period_s;

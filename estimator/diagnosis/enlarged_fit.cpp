@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -185,7 +186,11 @@ bool leaves_a_size_open(const EnlargedFit& fit, double most) {
 }
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
-  lower[axis] = Eigen::LLT<Eigen::MatrixXd>(covariance_V2).matrixL();
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance_V2);
+  lower[axis] = cholesky.matrixL();
+  // What is no covariance determines no fit.
+  if (cholesky.info() != Eigen::Success)
+    lower[axis].setConstant(std::numeric_limits<double>::quiet_NaN());
   inverse[axis] = inverse_of_triangle(lower[axis]);
 }
 

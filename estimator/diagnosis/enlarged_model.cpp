@@ -35,7 +35,7 @@ HeadGeometry head_geometry(const VisitLog& log, const EnlargedParameters& parame
     if (numbers[e].empty())
       active.effect->displace(log, visit, active.p.data(), head);
     else
-      active.effect->displace_by_number(log, visit, numbers[e][visit], head);
+      active.effect->displace_by_number(log, visit, numbers[e][visit], active.p.data(), head);
   }
   return head;
 }

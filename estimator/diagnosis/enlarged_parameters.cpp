@@ -26,7 +26,7 @@ namespace {
 ActiveEffect with_shapes(ActiveEffect active, bool free) {
   const auto infos = active.effect->parameters();
   for (std::size_t k = 0; k < infos.size(); ++k)
-    if (infos[k].role == ParameterRole::shape) active.free[k] = free;
+    if (infos[k].role == ParameterRole::shape && !infos[k].direction) active.free[k] = free;
   return active;
 }
 

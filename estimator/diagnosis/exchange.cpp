@@ -147,20 +147,24 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
   return exchanges;
 }
 
-/// What one candidate may take the place of: one effect, two, or all that one axis has.
+/// What one candidate may take the place of: one effect, two, all that one axis has, or all that
+/// the head has.
 std::vector<std::vector<std::size_t>> exchangeable(const SearchModel& model) {
   std::vector<std::vector<std::size_t>> subsets;
   for (std::size_t k = 0; k < model.size(); ++k) subsets.push_back({k});
   for (std::size_t k = 0; k < model.size(); ++k)
     for (std::size_t l = k + 1; l < model.size(); ++l) subsets.push_back({k, l});
-  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    std::vector<std::size_t> of_axis;
+  const auto add_all = [&](const auto& belongs) {
+    std::vector<std::size_t> all;
     for (std::size_t k = 0; k < model.size(); ++k)
-      if (model.candidate(k).axis == axis &&
-          model.candidate(k).effect->subject() == Subject::sensor)
-        of_axis.push_back(k);
-    if (of_axis.size() > 2) subsets.push_back(std::move(of_axis));
-  }
+      if (belongs(model.candidate(k)) && !model.is_certain(model.candidate(k))) all.push_back(k);
+    if (all.size() > 2) subsets.push_back(std::move(all));
+  };
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    add_all([axis](const Candidate& candidate) {
+      return candidate.axis == axis && candidate.effect->subject() == Subject::sensor;
+    });
+  add_all([](const Candidate& candidate) { return candidate.effect->subject() == Subject::head; });
   std::erase_if(subsets, [&](const std::vector<std::size_t>& subset) {
     return std::any_of(subset.begin(), subset.end(),
                        [&](std::size_t k) { return model.is_certain(model.candidate(k)); });
@@ -174,13 +178,13 @@ bool exchange_one(SearchModel& model) {
   const std::vector<std::vector<std::size_t>> subsets = exchangeable(model);
   if (subsets.empty()) return false;
   // Pairs grow with the square of the effects, and their fits with their parameters.
-  constexpr std::size_t kMost = 4, kMostInAll = 50, kMostOfAxis = 12;
+  constexpr std::size_t kMost = 4, kMostInAll = 50, kMostOfMany = 12;
   const std::size_t most = std::clamp(kMostInAll / subsets.size(), std::size_t{1}, kMost);
   const CandidateResponses& responses = model.responses();
   std::vector<std::vector<SearchModel::Entry>> exchanges(subsets.size());
   parallel_for(subsets.size(), [&](std::size_t s) {
     exchanges[s] =
-        exchanges_for(model, responses, subsets[s], subsets[s].size() > 2 ? kMostOfAxis : most);
+        exchanges_for(model, responses, subsets[s], subsets[s].size() > 2 ? kMostOfMany : most);
   });
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     for (const SearchModel::Entry& with : exchanges[s])

@@ -18,9 +18,8 @@ inline constexpr double kWorthExchanging = 2;
 bool exchange_in_own_noise(SearchModel& model, const std::vector<std::size_t>& effects,
                            const std::vector<SearchModel::Entry>& with, double more_names);
 
-/// Replaces one of the model's effects, two, or all of an axis, by a single one that explains as
-/// much for less.
-/// Whether there was one.
+/// Replaces one of the model's effects, two, all of an axis or all of the head, by a single one
+/// that explains as much for less. Whether there was one.
 bool exchange_one(SearchModel& model);
 
 /// Replaces all of the model's effects, or all but one, by effects of one kind, each on an axis of

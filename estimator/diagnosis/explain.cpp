@@ -166,8 +166,8 @@ PropagatedEstimate propagated(const VisitLog& log, const EnlargedFit& fit,
 }
 
 /// Schwarz's criterion of the pose means under the model and the noise that were found.
-double schwarz_criterion(const SearchResult& found) {
-  const double readings = static_cast<double>(found.fit.whitened_residual.size());
+double schwarz_criterion(const VisitLog& log, const SearchResult& found) {
+  const auto readings = static_cast<double>(mean_rows(log));
   double sum = std::log(readings) * static_cast<double>(found.fit.covariance.rows());
   for (const PooledNoise& noise : found.noise) sum += noise.likelihood_deviance;
   return sum;
@@ -205,7 +205,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     add_noise(wanders_beyond_record(search, found), model, diagnosis);
   };
   const auto without_effects = [&]() -> std::optional<Explained> {
-    result.schwarz_criterion = schwarz_criterion(found);
+    result.schwarz_criterion = schwarz_criterion(log, found);
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
     add_noise_to(result.diagnosis, {});
     return std::nullopt;
@@ -279,7 +279,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
   PerAxis<std::optional<AxisVerdictInput>> residual;
   const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
-  result.schwarz_criterion = schwarz_criterion(found);
+  result.schwarz_criterion = schwarz_criterion(log, found);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = found.fit.parameters.mps2_per_V(i);
     result.final.batch_ls[i] = with_gravity(axis_of(if_true, i), gravity);

@@ -20,22 +20,24 @@ struct ExplainInput {
   const std::vector<NoiseDriver>& noise_follows;
   const std::vector<PoseMean>& poses;
   const std::vector<SampleWindow>& windows;
-  const PerAxis<NoiseModel>& noise;   ///< as identified
-  PerAxis<Eigen::VectorXd> known_V2;  ///< variance of each pose by the head's positioning
-  const NoiseProcesses& processes;    ///< of the windows
-  PerAxis<PooledNoise> pooled;        ///< of the pose means beside the 12 parameters
+  const PerAxis<NoiseModel>& noise;  ///< as identified
+  PerAxis<Eigen::VectorXd>
+      known_V2;  ///< variance of each pose by positioning and by noise of its own
+  const NoiseProcesses& processes;  ///< of the windows
+  PerAxis<PooledNoise> pooled;      ///< of the pose means beside the 12 parameters
 };
 
 /// What comes of a calibration after effects were added.
 struct Explained {
-  double worst_error_mps2 = 0;  ///< the largest on left-out poses
+  double worst_error_mps2 = -1;  ///< the largest on left-out poses; negative: there is none
   double u_worst_mps2 = 0;
   PropagatedEstimate estimate;  ///< the twelve of the enlarged model
 };
 
 /// Searches the residual of a finished 12-parameter calibration. When effects are found and lower
 /// the error on left-out poses, fills diagnosis, final, after, floor and residual_after of `result`
-/// and says what else came of it; otherwise leaves `result` as it is.
+/// and says what else came of it. Otherwise `result` gets what the search tells beside: Schwarz's
+/// criterion, limits of what was not found, and what the noise follows.
 std::optional<Explained> explain(const ExplainInput& input, const CalibrationOptions& options,
                                  Calibration& result);
 

@@ -292,6 +292,8 @@ void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters
       like_it->axes.push_back(each.axis);
       like_it->parameters.push_back(std::move(ratio));
       like_it->p_value = std::max(like_it->p_value, each.p_value);
+      like_it->heldout_gain = std::max(like_it->heldout_gain, each.heldout_gain);
+      like_it->sigmas = std::max(like_it->sigmas, each.sigmas);
       continue;
     }
     diagnosis.unlisted.push_back({{},

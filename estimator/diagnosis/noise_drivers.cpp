@@ -169,6 +169,18 @@ void add_steps(const Driver& driver, const Eigen::VectorXd& values, Eigen::Index
   }
 }
 
+/// From one of so many values to another.
+void add_windows(const Driver& driver, const Eigen::VectorXd& values, int places,
+                 std::vector<Shape>& shapes) {
+  const double low = values.minCoeff(), part = (values.maxCoeff() - low) / places;
+  for (int from = 1; from < places; ++from)
+    for (int to = from + 1; to < places; ++to)
+      shapes.push_back({driver.name, "window",
+                        (values.array() >= low + part * from && values.array() < low + part * to)
+                            .cast<double>()
+                            .matrix()});
+}
+
 std::vector<Shape> shapes_for(const std::vector<Driver>& drivers, std::size_t axis) {
   std::vector<Shape> shapes;
   for (const Driver& driver : drivers) {
@@ -187,7 +199,11 @@ std::vector<Shape> shapes_for(const std::vector<Driver>& drivers, std::size_t ax
     add_powers(driver.name, of, values, driver.two_valued, shapes);
     // Something that was switched on, of itself or by what was recorded.
     constexpr Eigen::Index kInstants = 80, kLevels = 24;
-    if (driver.is_clock()) add_steps(driver, values, std::min(kInstants, values.size()), shapes);
+    constexpr int kEdges = 20;
+    if (driver.is_clock()) {
+      add_steps(driver, values, std::min(kInstants, values.size()), shapes);
+      add_windows(driver, values, kEdges, shapes);
+    }
     if (driver.recorded) add_steps(driver, values, std::min(kLevels, values.size()), shapes);
   }
   return shapes;
@@ -250,9 +266,10 @@ std::optional<NoiseDriver> within_dwells(const Scatter& scatter, std::size_t axi
   const double change = std::max(found.ratio, 1 / found.ratio);
   if (!(found.p_value < kDriverFalseAlarm) || change < kLeastChange) return {};
   found.heldout_gain = std::max(0.0, 1 - 1 / square);
-  constexpr double kQuarter = 0.25;
+  // Of the readings that share which the noisier part has.
+  const double noisier = scatter.early_V2 > scatter.late_V2 ? 0.25 : 0.75;
   found.excess_V2 =
-      kQuarter * std::abs(scatter.early_V2 - scatter.late_V2) * scatter.count.cwiseInverse();
+      noisier * std::abs(scatter.early_V2 - scatter.late_V2) * scatter.count.cwiseInverse();
   return found;
 }
 

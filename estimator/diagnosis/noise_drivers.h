@@ -30,9 +30,9 @@ struct NoiseDriver {
 /// The likeliest for each axis, if chance would not show as much in one of 10⁴ sets and the noise
 /// changes by more than a sixth. Of the logarithm of the variance of each dwell, freed of what is
 /// slow and of lines, which is nearly Gaussian: straight lines and parabolas of every variable and
-/// of |a_i|, harmonics of δ, steps of the time and of recorded columns; within the dwells, the
-/// first quarter against the rest. Nothing for an axis whose converter hides the noise, or with
-/// fewer than 16 readings in a dwell.
+/// of |a_i|, harmonics of δ, steps and windows of the time, steps of recorded columns; within the
+/// dwells, the first quarter against the rest. Nothing for an axis whose converter hides the noise,
+/// or with fewer than 16 readings in a dwell.
 std::vector<NoiseDriver> noise_drivers(const VisitLog& log, const MeasurementSet& set,
                                        const std::vector<Blocks>& partitions);
 

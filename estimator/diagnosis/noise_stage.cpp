@@ -163,7 +163,9 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
   const auto predicted = predict_means_V(input.log, parameters);
   const Eigen::MatrixXd jacobian = prediction_jacobian(input.log, parameters);
   const Eigen::Index n = predicted[0].size();
-  const double samples = static_cast<double>(input.log.visits.front().count);
+  Eigen::VectorXd readings(n);
+  for (Eigen::Index k = 0; k < n; ++k)
+    readings(k) = static_cast<double>(input.log.visits[static_cast<std::size_t>(k)].count);
   Stage stage;
   stage.observed = input.observed;
   stage.whitening.dwell_sd_V = dwell_scatter_V(input, parameters);
@@ -179,11 +181,12 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
     RoundingFree free{mean_V, Eigen::VectorXd::Zero(n)};
     const auto free_means = [&](const Eigen::VectorXd& expected_V) {
       // A converter without one of its bits does not round as it should.
-      if (!input.log.adc || samples < 2 || !input.log.codes[i].stuck_bits.empty()) return;
+      if (!input.log.adc || readings.maxCoeff() < 2 || !input.log.codes[i].stuck_bits.empty())
+        return;
       const CodeScale scale =
           on_lattice ? CodeScale{.origin_V = lattice->origin_V, .step_V = lattice->step_V}
                      : scale_of(*input.log.adc);
-      free = free_of_rounding(measured_V, expected_V, scale, input.log.sample_sd_V[i], samples,
+      free = free_of_rounding(measured_V, expected_V, scale, input.log.sample_sd_V[i], readings,
                               input.log.line_V2[i]);
       mean_V = free.mean_V;
     };

@@ -146,9 +146,8 @@ bool put_train_in_place_of(SearchModel& model, const std::vector<std::size_t>& i
       false_alarm);
 }
 
-}  // namespace
-
-void tell_in_one(SearchModel& model) {
+/// Whether something was told in one.
+bool told_one(SearchModel& model) {
   for (std::size_t k = 0; k < model.size(); ++k) {
     const Candidate& first = model.candidate(k);
     if (is_step(first)) {
@@ -157,7 +156,7 @@ void tell_in_one(SearchModel& model) {
           steps.begin(), steps.end(), [&](std::size_t l) { return is_step(model.candidate(l)); });
       // A train of which the run saw one pulse is still to be told.
       if (k == *first_step && steps.size() > 1 && put_train_in_place_of(model, steps, first.axis))
-        return tell_in_one(model);
+        return true;
     }
     std::vector<std::size_t> instances;
     std::vector<std::vector<double>> p;
@@ -169,7 +168,16 @@ void tell_in_one(SearchModel& model) {
     }
     if (instances.front() < k) continue;  // looked at with the first of them
     if (replace_in_one(model, instances, first, p, model.looks(), model.options().false_alarm))
-      return;
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void tell_in_one(SearchModel& model) {
+  constexpr int kMost = 8;  // noise that is estimated anew might lead there and back
+  for (int told = 0; told < kMost && told_one(model); ++told) {
   }
 }
 

@@ -13,7 +13,7 @@ namespace plumbline {
 
 double log_chi_squared_tail(double x, double dof) {
   if (!(x > 0)) return 0;
-  if (x < 200) return std::log(std::max(chi_squared_tail(x, dof), 1e-300));
+  if (x < 200 || x < 10 * dof) return std::log(std::max(chi_squared_tail(x, dof), 1e-300));
   // Leading terms of the incomplete gamma function for large x.
   const double half = 0.5 * dof, y = 0.5 * x;
   return (half - 1) * std::log(y) - y - log_gamma(half) + std::log1p((half - 1) / y);
@@ -73,8 +73,8 @@ std::vector<Scored> screen(const CandidateList& list, const CandidateGains& gain
     if (score < best[family].score) best[family] = {c, log_p, score, gains_of.dof(c)};
   }
   std::erase_if(best, [](const Scored& s) { return !std::isfinite(s.score); });
-  std::sort(best.begin(), best.end(),
-            [](const Scored& a, const Scored& b) { return a.score < b.score; });
+  std::stable_sort(best.begin(), best.end(),
+                   [](const Scored& a, const Scored& b) { return a.score < b.score; });
   return best;
 }
 

@@ -17,13 +17,15 @@ namespace plumbline {
 
 namespace {
 
-constexpr double kPerAmplitude = 7;  // about 2·ln of the number of poses
+constexpr double kPerAmplitude = 7;  // Schwarz: ln of the number of means, about 3 · 324
 
-/// Whether the time constant of what changes within the dwell is not known to be finite.
-bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
+/// Whether a time constant says nothing: that of what changes within the dwell is not known to be
+/// finite, that of a memory not known at all.
+bool has_no_time_constant(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
   constexpr double kDwells = 30;  // beyond so many its uncertainty is that of next to nothing
   const ActiveEffect& active = fit.parameters.effects[effect];
-  if (!active.effect->within_dwell()) return false;
+  const bool in_dwell = active.effect->within_dwell();
+  if (!in_dwell && !active.effect->remembers()) return false;
   const Visit& visit = log.visits.front();
   const double longest_s = kDwells * visit.duration_s();
   Eigen::Index row = fit.parameters.first_free(effect);
@@ -31,8 +33,8 @@ bool lasts(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
   for (std::size_t k = 0; k < infos.size(); ++k) {
     if (infos[k].role == ParameterRole::shape && infos[k].unit == "s") {
       const double tau_s = active.p[k];
-      if (tau_s > longest_s || (active.free[k] && fit.covariance(row, row) > tau_s * tau_s))
-        return true;
+      const bool known = active.free[k] ? fit.covariance(row, row) <= tau_s * tau_s : in_dwell;
+      if (!known || (in_dwell && tau_s > longest_s)) return true;
     }
     row += active.free[k] ? 1 : 0;
   }
@@ -54,17 +56,37 @@ double coincidence(const VisitLog& log, const ActiveEffect& active) {
   for (std::size_t k = 1; k < log.visits.size(); ++k) {
     const Visit& before = log.visits[k - 1];
     if (is_tilted_anew(k))
-      tilting_s += log.visits[k].t_arrival_s - before.t_arrival_s - before.duration_s();
+      tilting_s +=
+          std::max(0.0, log.visits[k].t_arrival_s - before.t_arrival_s - before.duration_s());
   }
-  const double share = tilting_s / (log.visits.back().t_arrival_s - log.first_s());
+  // Where no time passes on the ways, each is an instant among those between the visits.
+  const double share = std::max(tilting_s / (log.visits.back().t_arrival_s - log.first_s()),
+                                1 / static_cast<double>(log.visits.size()));
   return share < kFew ? share : 1;
 }
 
+/// Whether of an amplitude, without which the effect is another, next to nothing is known.
+bool lacks_what_it_needs(const EnlargedFit& fit, std::size_t effect) {
+  constexpr double kKnown = 4;  // standard uncertainties
+  const ActiveEffect& active = fit.parameters.effects[effect];
+  Eigen::Index row = fit.parameters.first_free(effect);
+  const auto infos = active.effect->parameters();
+  for (std::size_t k = 0; k < infos.size(); ++k) {
+    if (!active.free[k]) continue;
+    if (infos[k].needed && std::abs(active.p[k]) < kKnown * std::sqrt(fit.covariance(row, row)))
+      return true;
+    ++row;
+  }
+  return false;
+}
+
 /// What an effect of a model must gain besides its price. A transient that lasts has no more right
-/// to a name than what has none, and a time constant that says nothing. What happened just when the
+/// to a name than what has none, and a time constant that says nothing; what starts elsewhere and
+/// then does not follow its column is no function of that. What happened just when the
 /// tilt changed is more likely a function of the tilt.
 double surcharge(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
-  if (lasts(log, fit, effect)) return 2 * kHandicapOfUnnamed + kPerAmplitude;
+  if (has_no_time_constant(log, fit, effect) || lacks_what_it_needs(fit, effect))
+    return 2 * kHandicapOfUnnamed + kPerAmplitude;
   const double chance = coincidence(log, fit.parameters.effects[effect]);
   return chance < 1 ? 2 * (kHandicapOfUnnamed - std::log(chance)) : 0;
 }

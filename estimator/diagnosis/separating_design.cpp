@@ -19,7 +19,7 @@ using Eigen::Index;
 
 constexpr double kRegular = 1e-10;  ///< of information that is scaled to a unit diagonal
 constexpr std::size_t kLengths[] = {6, 12, 24, 48, 96};
-constexpr double kDelta_step_deg = 15;  ///< not a divisor of the usual 10°: aliases differ
+constexpr double kDelta_step_deg = 15;  ///< not a multiple of the usual 10°: aliases differ
 constexpr double kH_step_deg = 10;
 
 /// The run with stops after it, as the sequencer would go on.
@@ -44,7 +44,7 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
     visit.t_mean_s = visit.t_arrival_s + 0.5 * first.step_s * (static_cast<double>(count) - 1);
     visit.delta_direction = direction_after(before, visit.delta_rad);
     if (!longer.contrasts.contains(count))
-      longer.contrasts.emplace(count, contrasts_of(visit, log.line));
+      longer.contrasts.emplace(count, contrasts_of(visit, log));
     longer.visits.push_back(std::move(visit));
   }
   return longer;

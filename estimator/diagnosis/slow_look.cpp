@@ -84,6 +84,7 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
                                           const PerAxis<PooledNoise>& plain, const Stage& rich) {
   constexpr std::array kTowardsRich = {0.0, 0.8, 0.96, 1.0};
   CandidateResponses responses;
+  EnlargedFit fit;
   std::optional<CandidateGains> gains_of;
   Eigen::VectorXd gains = Eigen::VectorXd::Zero(std::ssize(slow.index));
   for (const double share : kTowardsRich) {
@@ -92,7 +93,7 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
       powers[i] = plain[i].power + share * (rich.noise[i].power - plain[i].power);
     Stage stage = settle_noise(input, model, {.powers = &powers, .freed = &rich});
     set_whitening(stage);
-    const EnlargedFit fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
+    fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
     responses = whitened(slow.responses_V, input.log, stage.whitening);
     gains_of.emplace(responses, fit);
     const Eigen::VectorXd with_these = gains_of->of_residual();

@@ -40,9 +40,9 @@ class DrivenTerm : public SmoothTerm {
   std::vector<std::string> columns() const override { return driver_->columns(); }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    displace_by_number(log, visit, of_visit(0, visit, p), head);
+    displace_by_number(log, visit, of_visit(0, visit, p), p, head);
   }
-  void displace_by_number(const VisitLog& log, std::size_t visit, double f,
+  void displace_by_number(const VisitLog& log, std::size_t visit, double f, const double*,
                           HeadGeometry& head) const override {
     head.*target_.angle += f * target_.factor_at(log.visits[visit]) * effect::kRadPerDeg;
   }
@@ -91,6 +91,14 @@ class DrivenTerm : public SmoothTerm {
     constexpr double kPart = 0.25;
     return kPart * (range_.second - range_.first) /
            static_cast<double>(driver_->value.front().size());
+  }
+  /// Where the range begins; what began when the clock did may not have waited for the first pose.
+  std::vector<double> beginnings() const {
+    constexpr double kSoonAfter = 0.1;  // as a share of the run
+    const auto [low, high] = range_;
+    std::vector<double> found = {low};
+    if (driver_->is_clock() && low > 0 && low < kSoonAfter * (high - low)) found.push_back(0);
+    return found;
   }
   /// In the middle between the two visits that a time lies between.
   double half_way_between_visits(double t_s) const {

@@ -149,6 +149,7 @@ std::string Driver::unit() const {
     return of_column.empty() || !is_rate() ? of_column : of_column + "/h";
   }
   if (two_valued) return "";
+  if (past.find("time") != std::string::npos) return "s";
   if (past.find("turn of delta") != std::string::npos || past.find("of h") != std::string::npos)
     return "rad";
   return component || name == "previous_pose" ? "g" : "";
@@ -230,9 +231,14 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
     for (double& value : of_axis) value = std::abs(value);
   const auto size_rad =
       for_all_axes(log, [&](std::size_t k) { return std::abs(turn_rad(log, k)); });
+  const auto way_s = for_all_axes(log, [&](std::size_t k) {
+    const Visit* before = log.before(k);
+    return before ? log.visits[k].t_arrival_s - before->t_arrival_s - before->duration_s() : 0;
+  });
   std::vector<Driver> drivers = {
       {"previous_pose", "size of the change of a_i since", std::move(size_g)},
-      {"previous_pose", "size of the turn of delta since", size_rad}};
+      {"previous_pose", "size of the turn of delta since", size_rad},
+      {"previous_pose", "time on the way", way_s}};
   for (Driver& driver : drivers) driver.span = about_zero(driver.value);
   return drivers;
 }

@@ -61,7 +61,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 std::vector<Driver> changes_of_others(const VisitLog& log);
 
 /// How far the component of the own axis and δ went on the way from the previous pose, whichever
-/// way, under the name of what came before.
+/// way, and how long that took, under the name of what came before.
 std::vector<Driver> sizes_of_changes(const VisitLog& log);
 
 /// The component of the own axis at the previous pose, under the name of what came before.

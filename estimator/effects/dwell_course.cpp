@@ -153,7 +153,52 @@ class RingDown final : public WithinDwell {
   }
 };
 
+/// Nothing moves an edge between two samples.
+class EventOfDwells final : public WithinDwell {
+ public:
+  explicit EventOfDwells(EventShape shape) : WithinDwell(CourseOf::one), shape_(shape) {}
+
+  std::string shape() const override { return is_step() ? "step" : "window"; }
+  std::vector<ParameterInfo> parameters() const override {
+    std::vector<ParameterInfo> infos = {{"from", "s", ParameterRole::index}};
+    if (!is_step()) infos.push_back({"to", "s", ParameterRole::index});
+    infos.push_back({"p", unit(), ParameterRole::amplitude});
+    return infos;
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
+    std::vector<Hypothesis> starts;
+    const Visit& visit = log.visits.front();
+    const auto before_s = [&](std::size_t sample) {
+      return (static_cast<double>(sample) - 0.5) * visit.step_s;
+    };
+    if (const auto& event = log.event[axis]; event && event->lasts == is_step()) {
+      starts.push_back({{before_s(event->from), effect::kSmallTerm}});
+      if (!is_step()) starts.back().p.insert(starts.back().p.begin() + 1, before_s(event->to));
+    }
+    for (std::size_t from = visit.count / 2; is_step() && from > 0; from /= 2)
+      starts.push_back({{before_s(from), effect::kSmallTerm}});
+    return starts;
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    return course_g(input, p).mean();
+  }
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
+    const Eigen::ArrayXd t_s = effect::since_arrival_s(input.at());
+    if (is_step()) return p[1] * (t_s > p[0]).cast<double>().matrix();
+    return p[2] * (t_s > p[0] && t_s < p[1]).cast<double>().matrix();
+  }
+
+ private:
+  bool is_step() const { return shape_ == EventShape::step; }
+
+  EventShape shape_;
+};
+
 }  // namespace
+
+std::unique_ptr<SmoothTerm> event_of_dwells(EventShape shape) {
+  return std::make_unique<EventOfDwells>(shape);
+}
 
 std::unique_ptr<SmoothTerm> ring_down(CourseOf of) { return std::make_unique<RingDown>(of); }
 

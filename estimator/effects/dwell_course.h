@@ -18,4 +18,9 @@ std::unique_ptr<SmoothTerm> dwell_course(const VisitLog& log, CourseOf of, int d
 /// unknown frequency: of one size, or of the size of the step.
 std::unique_ptr<SmoothTerm> ring_down(CourseOf of);
 
+/// A step at one time after every arrival, or a window between two: where something shows in every
+/// dwell (VisitLog::event), and a step also where step_contrasts() have one.
+enum class EventShape { step, window };
+std::unique_ptr<SmoothTerm> event_of_dwells(EventShape shape);
+
 }  // namespace plumbline

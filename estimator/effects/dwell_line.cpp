@@ -311,9 +311,11 @@ std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double 
 
 }  // namespace
 
-std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::size_t axis) {
+namespace {
+
+/// The strongest line in the courses of dwells.
+std::optional<DwellLine> line_in_courses(const Dwells& dwells) {
   constexpr std::size_t kStrongest = 3;
-  const Dwells dwells = courses_of(set, axis);
   if (!dwells.say_enough()) return {};
   const double width_hz = 0.5 / dwells.dwell_s();
 
@@ -342,6 +344,29 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
   const double aliases = 1 + 2 * kRates;
   return line_of(dwells, best,
                  aliases * static_cast<double>(looked_at) * width_hz * dwells.run_s());
+}
+
+}  // namespace
+
+std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::size_t axis) {
+  return line_in_courses(courses_of(set, axis));
+}
+
+std::optional<DwellLine> line_of_angle(const MeasurementSet& set,
+                                       const PerAxis<Eigen::VectorXd>& by_angle) {
+  Dwells dwells = courses_of(set, 0);
+  if (!dwells.say_enough()) return {};
+  dwells.off_V.setZero();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    const Dwells of_axis = courses_of(set, axis);
+    Eigen::Index k = 0;
+    for (std::size_t pose = 0; pose < set.poses.size(); ++pose) {
+      if (set.poses[pose].count < kFewestSamples) continue;
+      dwells.off_V.col(k) += by_angle[axis](static_cast<Eigen::Index>(pose)) * of_axis.off_V.col(k);
+      ++k;
+    }
+  }
+  return line_in_courses(dwells);
 }
 
 std::optional<DwellLine> line_between_dwells(const MeasurementSet& set,

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 #include "estimator/noise/chi_squared.h"
+#include "estimator/noise/covariance.h"
 
 namespace plumbline {
 
@@ -13,7 +15,8 @@ double Effect::term_g(const TermInput&, const double*) const { return 0; }
 
 double Effect::term_of_number_g(const TermInput&, double) const { return 0; }
 
-void Effect::displace_by_number(const VisitLog&, std::size_t, double, HeadGeometry&) const {}
+void Effect::displace_by_number(const VisitLog&, std::size_t, double, const double*,
+                                HeadGeometry&) const {}
 
 Eigen::VectorXd Effect::course_g(const TermInput& input, const double* p) const {
   return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(input.at().count), term_g(input, p));
@@ -29,6 +32,53 @@ namespace effect {
 double share_below(double edge, double value, double sd) {
   if (!(sd > 0)) return value < edge ? 1 : 0;
   return normal_below((edge - value) / sd);
+}
+
+// Over a run of hours the phase at its end must change by little only.
+ParameterInfo line_frequency() { return {"f", "Hz", ParameterRole::shape, 1e-7}; }
+ParameterInfo line_phase() { return {"phase", "deg", ParameterRole::shape, 1e-2}; }
+
+double start_of_phase_deg(const DwellLine& line) {
+  const double phase_deg = line.phase_rad / kRadPerDeg;
+  return phase_deg < 180 ? phase_deg + 360 : phase_deg;
+}
+
+namespace {
+double phase_of_first_sample_rad(const Visit& visit, double f_hz, double phase_deg) {
+  return kTurn_rad * (f_hz * visit.t_arrival_s + phase_deg / 360);
+}
+}  // namespace
+
+double mean_of_sine(const Visit& visit, double f_hz, double phase_deg) {
+  const double to_middle_rad =
+      0.5 * kTurn_rad * f_hz * visit.step_s * (static_cast<double>(visit.count) - 1);
+  return share_of_sine({visit.t_arrival_s, visit.step_s, visit.count}, f_hz) *
+         std::sin(phase_of_first_sample_rad(visit, f_hz, phase_deg) + to_middle_rad);
+}
+
+Eigen::VectorXd sine(const Visit& visit, double f_hz, double phase_deg) {
+  // Turned on from sample to sample: sines one by one would be a quarter of a search's time.
+  const std::complex<double> turn = std::polar(1.0, kTurn_rad * f_hz * visit.step_s);
+  std::complex<double> phasor = std::polar(1.0, phase_of_first_sample_rad(visit, f_hz, phase_deg));
+  Eigen::VectorXd course(static_cast<Eigen::Index>(visit.count));
+  for (double& value : course) {
+    value = phasor.imag();
+    phasor *= turn;
+  }
+  return course;
+}
+
+void normalise_sine(double& amplitude, double& phase_deg) {
+  if (amplitude < 0) phase_deg += 180;
+  amplitude = std::abs(amplitude);
+  phase_deg -= 360 * std::floor(phase_deg / 360);
+}
+
+Hypothesis harmonic(int n, int positions, double angle_rad, double size) {
+  Hypothesis start{{static_cast<double>(n), size, size}};
+  const bool cosine = std::abs(std::cos(n * angle_rad)) > 0.5;
+  if (2 * n == positions) start.p[cosine ? 2 : 1] = 0;
+  return start;
 }
 
 int whole_numbers(double first, double last) {

@@ -31,6 +31,10 @@ struct ParameterInfo {
   ParameterRole role = ParameterRole::amplitude;
   double step = 0;     ///< over which the response is differentiated; 0: fitted to role and value
   bool place = false;  ///< shape: a place, which may be zero or negative, and not a size
+  /// Amplitude: where next to nothing is known of it, what is left is another effect.
+  bool needed = false;
+  /// Shape: the direction of what has two amplitudes, known as well as they are.
+  bool direction = false;
   /// How something went that nothing recorded says: a program needs it, a reader does not.
   bool unrecorded = false;
   /// Index: when something happened, which lies somewhere between two samples.
@@ -108,7 +112,7 @@ class Effect {
   /// term_g() and displace() from that number.
   virtual double term_of_number_g(const TermInput& input, double number) const;
   virtual void displace_by_number(const VisitLog& log, std::size_t visit, double number,
-                                  HeadGeometry& head) const;
+                                  const double* p, HeadGeometry& head) const;
   /// Sensor: whether it may be one of this axis.
   virtual bool acts_on(std::size_t /*axis*/) const { return true; }
   /// Sensor: whether it is a function of what the converter is given, all other terms included.
@@ -199,12 +203,28 @@ inline ParameterInfo instant(std::string name) {
 /// How many positions a turn has, as closely as two of these angles lie together. Harmonics of more
 /// than half of that look like lower ones.
 int positions_of_a_turn(std::vector<double> angles_rad);
+/// A harmonic of order n of an angle that takes so many positions: n and the amplitudes of cosine
+/// and sine, of a typical `size`. Two positions a period show only how they differ: there one of
+/// the amplitudes is zero, the one that `angle_rad`, of any position, does not show.
+Hypothesis harmonic(int n, int positions, double angle_rad, double size);
 /// Times of the samples of the visit from the first on.
 Eigen::ArrayXd since_arrival_s(const Visit& visit);
 /// exp(−(t − t_arrival)/τ) at those times.
 Eigen::ArrayXd decay_since_arrival(const Visit& visit, double tau_s);
 /// Mean over the dwell of exp(−(t − origin)/τ), in closed form for even spacing.
 double mean_decay(const Visit& visit, double origin_s, double tau_s);
+/// Frequency and phase of a line, sin(2π·f·t + phase), t on the clock of the run.
+ParameterInfo line_frequency();
+ParameterInfo line_phase();
+/// Where the fit of a phase starts: it keeps the sign of a shape, and from half a turn up no phase
+/// comes near zero.
+double start_of_phase_deg(const DwellLine& line);
+/// Mean over the dwell of such a line of amplitude 1.
+double mean_of_sine(const Visit& visit, double f_hz, double phase_deg);
+/// The same at every sample.
+Eigen::VectorXd sine(const Visit& visit, double f_hz, double phase_deg);
+/// A positive amplitude, a phase within one turn.
+void normalise_sine(double& amplitude, double& phase_deg);
 /// `count` values from `first` to `last` in equal ratios.
 std::vector<double> geometric(double first, double last, int count);
 /// Share of Gaussian noise of standard deviation `sd` about `value` that lies below `edge`; with no

@@ -64,15 +64,11 @@ class Polynomial final : public DrivenTerm {
     const double slope = legendre_slope(touched, p[0], p[1], linear, degree_);
     return series(value) - series(touched) - slope * (value - touched);
   }
-  bool mean_in_the_twelve() const {
-    return target().form == TermForm::geometry ? target().angle == &HeadGeometry::delta_rad
-                                               : !target().second;
-  }
-  bool has_reference() const { return variable().reference && mean_in_the_twelve(); }
+  bool has_reference() const { return variable().reference && target().mean_in_the_twelve(); }
   bool is_of_h() const { return variable().name == "h_deg"; }
   int first_degree() const {
     const bool may_be_offset = variable().recorded || variable().is_clock() || is_of_h();
-    return may_be_offset && !mean_in_the_twelve() ? 0 : 1;
+    return may_be_offset && !target().mean_in_the_twelve() ? 0 : 1;
   }
 
   int degree_;
@@ -144,12 +140,8 @@ class Harmonic final : public DrivenTerm {
     const int positions = effect::positions_of_a_turn(variable().value[0]);
     const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    for (int n = lowest_; n <= kHighest && 2 * n <= positions; ++n) {
-      starts.push_back({{static_cast<double>(n), size, size}});
-      // Two positions a period show only how they differ.
-      const bool cosine = std::abs(std::cos(n * variable().value[0].front())) > 0.5;
-      if (2 * n == positions) starts.back().p[cosine ? 2 : 1] = 0;
-    }
+    for (int n = lowest_; n <= kHighest && 2 * n <= positions; ++n)
+      starts.push_back(effect::harmonic(n, positions, variable().value[0].front(), size));
     return starts;
   }
 
@@ -301,14 +293,9 @@ class Power final : public DrivenTerm {
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    const auto [low, high] = range();
-    // What began when the clock did may not have waited for the first pose.
-    constexpr double kSoonAfter = 0.1;  // as a share of the run
-    std::vector<double> beginnings = {low};
-    if (variable().is_clock() && low > 0 && low < kSoonAfter * (high - low))
-      beginnings.push_back(0);
+    const double high = range().second;
     std::vector<Hypothesis> starts;
-    for (const double beginning : beginnings)
+    for (const double beginning : beginnings())
       for (const double power : {0.5, 2.0})
         starts.push_back({{beginning, high, power, target().typical_size()}});
     return starts;
@@ -335,8 +322,9 @@ class Logarithm final : public DrivenTerm {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    for (const double share : {0.003, 0.03, 0.3})
-      starts.push_back({{low, share * (high - low), target().typical_size()}});
+    for (const double beginning : beginnings())
+      for (const double share : {0.003, 0.03, 0.3})
+        starts.push_back({{beginning, share * (high - low), target().typical_size()}});
     return starts;
   }
 
@@ -354,7 +342,8 @@ std::string Target::words() const {
     const char* const grows = pull == Pull::cosine_of_h ? ", times the cosine of h"
                               : pull == Pull::sine_of_h ? ", times the sine of h"
                                                         : "";
-    const char* const to = angle == &HeadGeometry::h_rad      ? ", added to h"
+    const char* const to = any_direction                      ? ", added to the tilt of the base"
+                           : angle == &HeadGeometry::h_rad    ? ", added to h"
                            : angle == &HeadGeometry::roll_rad ? ", added to the base roll"
                            : angle == &HeadGeometry::skew_rad ? ", added to the skew of the spindle"
                                                               : ", added to delta";
@@ -365,6 +354,10 @@ std::string Target::words() const {
   if (form != TermForm::scale || (other == 0 && !second)) return "";
   return std::string(", times ") + kComponent[other] +
          (second ? std::string(" and ") + kComponent[*second] : "");
+}
+
+bool Target::mean_in_the_twelve() const {
+  return form == TermForm::geometry ? angle == &HeadGeometry::delta_rad : !second;
 }
 
 const char* Target::unit() const {

@@ -21,9 +21,12 @@ struct Target {
   /// Scale: the components multiplied are those of axes i + other and, if any, i + second.
   std::size_t other = 0;
   std::optional<std::size_t> second = {};
-  Pull pull = Pull::none;  ///< geometry
+  Pull pull = Pull::none;      ///< geometry
+  bool any_direction = false;  ///< geometry: of h, for towards_a_direction()
 
   std::string words() const;
+  /// Whether what is added to all visits alike is what the 12 parameters describe.
+  bool mean_in_the_twelve() const;
   const char* unit() const;
   double typical_size() const;
   /// What the function is multiplied with: for a scale the components, g or g².
@@ -87,6 +90,14 @@ bool is_saw_tooth(const Effect& effect);
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
 /// How a step is searched for; once found, both say the same.
 enum class StepEdge { sharp, gradual };
+/// Nothing on one side of an unknown value, an unknown power of the distance from it on the other.
+std::unique_ptr<SmoothTerm> power_beyond(DriverPointer driver, const Target& target);
+/// Proportional to a component of the specific force, the axis's own, beyond an unknown value or
+/// size and nothing up to it: an amplifier that changes its range.
+std::unique_ptr<SmoothTerm> gain_beyond(DriverPointer component, const Target& target);
+/// From one side to the other twice a turn, at an unknown angle and over an unknown part of it: a
+/// load that is thrown across a play.
+std::unique_ptr<SmoothTerm> thrown(DriverPointer angle, const Target& target);
 /// From nothing to all of it about an unknown value (logistic function).
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge);
 /// What dies away with the time, by an unknown time constant.
@@ -102,12 +113,19 @@ std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target, OfP
 /// What the driver draws along against friction: from −1 to 1, over an unknown reach.
 std::unique_ptr<SmoothTerm> friction(DriverPointer driver, const Target& target);
 
+/// One of two states, to which the driver brings it beyond one or the other of two unknown values:
+/// a relay, or a spring that snaps.
+std::unique_ptr<SmoothTerm> relay(DriverPointer driver, const Target& target);
+
 /// A harmonic of an angle, with amplitude and phase in a straight line of the driver.
 std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                 const Target& target);
 /// Two straight lines and their product.
 std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
                                             const Target& target);
+/// The same in a parabola.
+std::unique_ptr<SmoothTerm> parabola_times_harmonic(DriverPointer driver, DriverPointer angle,
+                                                    const Target& target);
 /// The products of a harmonic of one angle and a harmonic of another.
 std::unique_ptr<SmoothTerm> harmonic_times_harmonic(DriverPointer angle, DriverPointer other,
                                                     const Target& target);

@@ -1,6 +1,9 @@
 // What depends on two variables at once.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
+#include <tuple>
 #include <utility>
 
 #include "estimator/effects/driven_term.h"
@@ -16,42 +19,54 @@ double position(double value, double low, double high) {
   return (2 * value - low - high) / (high - low);
 }
 
-/// A harmonic of an angle whose amplitude and phase follow another variable in a straight line.
+/// A harmonic of an angle whose amplitude and phase follow another variable in a straight line or a
+/// parabola.
 class LineTimesHarmonic final : public DrivenTerm {
  public:
-  LineTimesHarmonic(DriverPointer driver, DriverPointer angle, Target target)
-      : DrivenTerm(std::move(driver), target), angle_(std::move(angle)) {}
+  LineTimesHarmonic(DriverPointer driver, DriverPointer angle, Target target, unsigned degree)
+      : DrivenTerm(std::move(driver), target), angle_(std::move(angle)), degree_(degree) {}
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", variable().unit(), ParameterRole::index},
-            {"high", variable().unit(), ParameterRole::index},
-            {"n", "", ParameterRole::index},
-            {"c0", target().unit(), ParameterRole::amplitude},
-            {"s0", target().unit(), ParameterRole::amplitude},
-            {"c1", target().unit(), ParameterRole::amplitude},
-            {"s1", target().unit(), ParameterRole::amplitude}};
+    std::vector<ParameterInfo> infos = {{"low", variable().unit(), ParameterRole::index},
+                                        {"high", variable().unit(), ParameterRole::index},
+                                        {"n", "", ParameterRole::index}};
+    for (unsigned d = 0; d <= degree_; ++d)
+      for (const char* part : {"c", "s"})
+        infos.push_back({part + std::to_string(d), target().unit(), ParameterRole::amplitude});
+    return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    const auto [low, high] = range();
-    const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    if (!angle_->varies()) return starts;
-    for (int n = 1; n <= kHighestHarmonic; ++n)
-      starts.push_back({{low, high, static_cast<double>(n), size, size, size, size}});
+    if (!angle_->varies() || !resolves(static_cast<int>(degree_))) return starts;
+    std::vector<double> p(parameters().size(), target().typical_size());
+    std::tie(p[0], p[1]) = range();
+    for (int n = 1; n <= kHighestHarmonic; ++n) {
+      p[2] = n;
+      starts.push_back({p});
+    }
     return starts;
   }
 
  private:
   std::string function() const override {
-    return "straight line, times a harmonic of " + angle_->name;
+    return (degree_ == 1 ? "straight line, times a harmonic of "
+                         : "parabola, times a harmonic of ") +
+           angle_->name;
   }
   double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
     const double x = position(variable().value[axis][visit], p[0], p[1]);
     const double phase = p[2] * angle_->value[axis][visit];
-    return (p[3] + x * p[5]) * std::cos(phase) + (p[4] + x * p[6]) * std::sin(phase);
+    const std::array legendre = {1.0, x, 1.5 * x * x - 0.5};
+    double cosine = 0, sine = 0;
+    for (unsigned d = 0; d <= degree_; ++d) {
+      cosine += p[3 + 2 * d] * legendre[d];
+      sine += p[4 + 2 * d] * legendre[d];
+    }
+    return cosine * std::cos(phase) + sine * std::sin(phase);
   }
 
   DriverPointer angle_;
+  unsigned degree_;
 };
 
 /// With what each does by itself: where its zero lies nobody knows.
@@ -134,7 +149,11 @@ class HarmonicTimesHarmonic final : public DrivenTerm {
 
 std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                 const Target& target) {
-  return std::make_unique<LineTimesHarmonic>(std::move(driver), std::move(angle), target);
+  return std::make_unique<LineTimesHarmonic>(std::move(driver), std::move(angle), target, 1);
+}
+std::unique_ptr<SmoothTerm> parabola_times_harmonic(DriverPointer driver, DriverPointer angle,
+                                                    const Target& target) {
+  return std::make_unique<LineTimesHarmonic>(std::move(driver), std::move(angle), target, 2);
 }
 std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
                                             const Target& target) {

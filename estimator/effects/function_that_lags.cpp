@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "estimator/effects/driven_term.h"
+#include "estimator/effects/place.h"
 
 namespace plumbline {
 namespace {
@@ -197,8 +198,64 @@ class FrictionLag final : public Lag {
   }
 };
 
+class Relay final : public Lag {
+ public:
+  Relay(DriverPointer driver, const Target& target) : Lag(std::move(driver), target, 3) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
+            {.name = "start", .unit = "", .role = ParameterRole::index, .unrecorded = true},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 12;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int from = 1; from < kParts; ++from)
+      for (int to = from + 1; to < kParts; ++to)
+        starts.push_back({{low + (high - low) * from / kParts, low + (high - low) * to / kParts, 1,
+                           target().typical_size()}});
+    return starts;
+  }
+  // Nothing moves a threshold between two values.
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 4;  // on either side
+    constexpr double kApart = 0.02;
+    const double apart = kApart * (range().second - range().first);
+    std::vector<Hypothesis> others;
+    for (int low = -kPlaces; low <= kPlaces; ++low)
+      for (int high = -kPlaces; high <= kPlaces; ++high)
+        for (const double start : {-1.0, 1.0})
+          others.push_back(
+              {{found.p[0] + apart * low, found.p[1] + apart * high, start, found.p[3]}});
+    return others;
+  }
+  double choice_uncertainty(const VisitLog&, std::size_t axis, const std::vector<double>& p,
+                            std::size_t k) const override {
+    return k < 2 ? effect::u_between_neighbours(variable().value[axis], p[k]) : 0;
+  }
+
+ private:
+  std::string function() const override { return "relay"; }
+  std::vector<double> course(std::size_t axis, const double* shape) const override {
+    double state = shape[2];
+    std::vector<double> states;
+    for (const double value : variable().value[axis]) {
+      if (value > shape[1]) state = 1;
+      if (value < shape[0]) state = -1;
+      states.push_back(state);
+    }
+    return states;
+  }
+};
+
 }  // namespace
 
+std::unique_ptr<SmoothTerm> relay(DriverPointer driver, const Target& target) {
+  return std::make_unique<Relay>(std::move(driver), target);
+}
 std::unique_ptr<SmoothTerm> play(DriverPointer driver, const Target& target, OfPlay of) {
   return std::make_unique<Play>(std::move(driver), target, of);
 }

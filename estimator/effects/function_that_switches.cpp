@@ -161,6 +161,7 @@ class Relaxation final : public DrivenTerm {
   Relaxation(DriverPointer clock, const Target& target, double longest_s)
       : DrivenTerm(std::move(clock), target), longest_s_(longest_s) {}
 
+  bool repeats() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {effect::instant("from"),
             {"tau", "s", ParameterRole::shape},

@@ -220,6 +220,117 @@ class Bend final : public DrivenTerm {
   static constexpr double kOdd = 0, kEven = 2, kValley = 3;
 };
 
+class PowerBeyond final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
+            {"side", "", ParameterRole::index},
+            place("at"),
+            {"power", "", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 6;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (const double side : {-1.0, 1.0})
+      for (int k = 1; k < kParts; ++k)
+        for (const double power : {0.6, 1.6})
+          starts.push_back(
+              {{low, high, side, low + (high - low) * k / kParts, power, target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "power beyond a value"; }
+  double at(double value, const double* p) const override {
+    const double beyond = p[2] * (value - p[3]) / (p[1] - p[0]);
+    return beyond > 0 && p[4] > 0 ? p[5] * std::pow(beyond, p[4]) : 0;
+  }
+};
+
+/// Nothing moves the edge between two values, so it is searched for.
+class GainBeyond final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"side", "", ParameterRole::index},
+            {"at", variable().unit(), ParameterRole::index},
+            {"p", "g/g", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    std::vector<Hypothesis> starts;
+    if (is_of_another_axis(axis)) return starts;
+    constexpr int kParts = 16;
+    const auto [low, high] = range();
+    const double most = std::max(std::abs(low), std::abs(high));
+    for (int k = 1; k < kParts; ++k) {
+      starts.push_back({{kBoth, most * k / kParts, target().typical_size()}});
+      starts.push_back({{kAbove, low + (high - low) * k / kParts, target().typical_size()}});
+    }
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 10;  // on either side
+    constexpr double kApart = 0.006;
+    std::vector<Hypothesis> others;
+    for (int place = -kPlaces; place <= kPlaces; ++place)
+      others.push_back({{found.p[0], found.p[1] + kApart * (range().second - range().first) * place,
+                         found.p[2]}});
+    return others;
+  }
+  double choice_uncertainty(const VisitLog&, std::size_t axis, const std::vector<double>& p,
+                            std::size_t k) const override {
+    if (k != 1) return 0;
+    std::vector<double> values = variable().value[axis];
+    for (double& value : values) value = decides(value, p[0]);
+    return effect::u_between_neighbours(std::move(values), p[1]);
+  }
+
+ private:
+  static constexpr double kBoth = 0, kAbove = 1;
+
+  static double decides(double value, double side) {
+    return side == kBoth ? std::abs(value) : value;
+  }
+  std::string function() const override { return "gain beyond a value"; }
+  double at(double value, const double* p) const override {
+    return decides(value, p[0]) > p[1] ? p[2] * value : 0;
+  }
+};
+
+class Thrown final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    constexpr double kFine_rad = 0.1 * effect::kRadPerDeg;
+    return {{"middle", "rad", ParameterRole::shape, kFine_rad, true},
+            {"softness", "", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 10;  // of half a turn: the amplitude has a sign
+    std::vector<Hypothesis> starts;
+    for (int k = 0; k < kParts; ++k)
+      for (const double softness : {0.05, 0.3})
+        starts.push_back(
+            {{0.5 * effect::kTurn_rad * k / kParts, softness, target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "thrown from side to side"; }
+  double at(double value, const double* p) const override {
+    return p[2] * std::tanh(std::cos(value - p[0]) / p[1]);
+  }
+};
+
 class Step final : public DrivenTerm {
  public:
   Step(DriverPointer driver, Target target, StepEdge edge)
@@ -308,6 +419,15 @@ std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target) {
 }
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target) {
   return std::make_unique<Bend>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> power_beyond(DriverPointer driver, const Target& target) {
+  return std::make_unique<PowerBeyond>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> gain_beyond(DriverPointer component, const Target& target) {
+  return std::make_unique<GainBeyond>(std::move(component), target);
+}
+std::unique_ptr<SmoothTerm> thrown(DriverPointer angle, const Target& target) {
+  return std::make_unique<Thrown>(std::move(angle), target);
 }
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge) {
   return std::make_unique<Step>(std::move(driver), target, edge);

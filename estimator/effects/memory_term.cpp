@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "estimator/effects/base_tilt.h"
 #include "estimator/effects/function_of_driver.h"
 
 namespace plumbline {
@@ -60,6 +61,7 @@ class Memory {
         log_(log) {}
 
   const std::string& name() const { return name_; }
+  bool is_of_column() const { return driver_->recorded; }
   std::string unit() const { return driver_->unit(); }
   std::vector<std::string> columns() const { return driver_->columns(); }
   /// At which U₀ and K are stated.
@@ -128,17 +130,23 @@ class MemoryTerm final : public SmoothTerm {
                                                        : "the average of the past";
     return std::string("straight line in ") + argument + target_.words();
   }
-  Subject subject() const override { return Subject::sensor; }
+  Subject subject() const override {
+    return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
+  }
   bool remembers() const override { return true; }
   std::vector<std::string> columns() const override { return memory_->columns(); }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", memory_->unit(), ParameterRole::index},
-            {"high", memory_->unit(), ParameterRole::index},
-            {"t0", "s", ParameterRole::index},
-            {"tau", "s", ParameterRole::shape},
-            {"start", target_.unit(), ParameterRole::amplitude},
-            {"p1", target_.unit(), ParameterRole::amplitude},
-            {"ref", memory_->unit(), ParameterRole::index}};
+    std::vector<ParameterInfo> infos = {
+        {"low", memory_->unit(), ParameterRole::index},
+        {"high", memory_->unit(), ParameterRole::index},
+        {"t0", "s", ParameterRole::index},
+        {"tau", "s", ParameterRole::shape},
+        {"start", target_.unit(), ParameterRole::amplitude},
+        {.name = "p1", .unit = target_.unit(), .role = ParameterRole::amplitude, .needed = true},
+        {"ref", memory_->unit(), ParameterRole::index}};
+    if (!target_.mean_in_the_twelve())
+      infos.push_back({"p0", target_.unit(), ParameterRole::amplitude});
+    return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     const double span_s = log.last_s() - log.first_s();
@@ -149,8 +157,12 @@ class MemoryTerm final : public SmoothTerm {
       if (tau_s < step_s || tau_s > span_s / 2) continue;
       const auto [low, high] = memory_->range(tau_s);
       if (!(high > low)) continue;  // what never varied drives nothing
-      for (const double start : {0.0, size})
-        starts.push_back({{low, high, log.first_s(), tau_s, start, size, memory_->reference()}});
+      for (const double start : {0.0, size}) {
+        std::vector<double> p = {low,   high, log.first_s(),       tau_s,
+                                 start, size, memory_->reference()};
+        if (!target_.mean_in_the_twelve()) p.push_back(size);
+        starts.push_back({std::move(p)});
+      }
     }
     return starts;
   }
@@ -159,6 +171,14 @@ class MemoryTerm final : public SmoothTerm {
   }
   double term_of_number_g(const TermInput& input, double f) const override {
     return target_.factor(input) * f;
+  }
+  void displace(const VisitLog& log, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    displace_by_number(log, visit, of_visit(log, 0, visit, p), p, head);
+  }
+  void displace_by_number(const VisitLog&, std::size_t, double f, const double*,
+                          HeadGeometry& head) const override {
+    head.*target_.angle += f * effect::kRadPerDeg;
   }
   std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t axis,
                                         const double* p) const override {
@@ -171,11 +191,12 @@ class MemoryTerm final : public SmoothTerm {
  private:
   double of_visit(const VisitLog& log, std::size_t axis, std::size_t visit, const double* p) const {
     const double t0_s = p[2], tau_s = p[3];
-    if (tau_s > longest_s_) return 0;
+    if (!(tau_s > 0) || tau_s > longest_s_) return 0;
     // What was remembered before the first visit, nobody saw.
     const double start = p[4] * effect::mean_decay(log.visits[visit], t0_s, tau_s);
     const double slope = 2 * p[5] / (p[1] - p[0]);
-    return start + slope * (memory_->at(tau_s, axis, visit) - p[6]);
+    const double mean = target_.mean_in_the_twelve() ? 0 : p[7];
+    return mean + start + slope * (memory_->at(tau_s, axis, visit) - p[6]);
   }
 
   std::shared_ptr<const Memory> memory_;
@@ -197,6 +218,17 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
   for (const auto& memory : memories)
     for (const TermForm form : {TermForm::bias, TermForm::scale})
       terms.push_back(std::make_unique<MemoryTerm>(memory, Target{form}, longest_s));
+  constexpr Target kDelta{.form = TermForm::geometry}, kH{TermForm::geometry, &HeadGeometry::h_rad},
+      kRoll{TermForm::geometry, &HeadGeometry::roll_rad},
+      kTilt{.form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
+  for (const auto& memory : memories) {
+    if (!memory->is_of_column()) continue;
+    const auto of = [&](const Target& target) {
+      return std::make_unique<MemoryTerm>(memory, target, longest_s);
+    };
+    for (const Target& target : {kDelta, kH, kRoll}) terms.push_back(of(target));
+    terms.push_back(towards_a_direction(of(kTilt)));
+  }
   return terms;
 }
 

@@ -26,7 +26,7 @@ class DeltaPeriodic final : public Effect {
     std::vector<Hypothesis> starts;
     for (int n = 3; n <= 17 && 2 * n <= positions; ++n)
       starts.push_back(
-          {{static_cast<double>(n), effect::kSmallAngle_deg, effect::kSmallAngle_deg}});
+          effect::harmonic(n, positions, log.visits.front().delta_rad, effect::kSmallAngle_deg));
     return starts;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,

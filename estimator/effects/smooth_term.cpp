@@ -6,11 +6,13 @@
 #include <limits>
 #include <utility>
 
+#include "estimator/effects/base_tilt.h"
 #include "estimator/effects/driver.h"
 #include "estimator/effects/dwell_course.h"
 #include "estimator/effects/function_of_driver.h"
 #include "estimator/effects/head_decay.h"
 #include "estimator/effects/memory_term.h"
+#include "estimator/effects/steady_line.h"
 
 namespace plumbline {
 
@@ -62,6 +64,8 @@ const Target kBias{TermForm::bias}, kScale{TermForm::scale};
 const Target kDelta{TermForm::geometry}, kH{TermForm::geometry, &HeadGeometry::h_rad};
 const Target kRoll{TermForm::geometry, &HeadGeometry::roll_rad};
 const Target kSkew{TermForm::geometry, &HeadGeometry::skew_rad};
+const Target kTilt{
+    .form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
 
 /// An angle that follows the load as it turns with the tilt.
 std::array<Target, 2> pulled(const Target& angle) {
@@ -92,6 +96,7 @@ class TermList {
     if (any_ || attitude->varies()) {
       add(play(attitude, kBias, OfPlay::lag));
       add(friction(attitude, kBias));
+      add(relay(attitude, kBias));
       add(friction(attitude, {.form = TermForm::scale, .second = 0}));
     }
     for (auto& term : memory_terms(log_, longest_s(), attitude, columns_)) add(std::move(term));
@@ -102,6 +107,11 @@ class TermList {
     for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
       for (const int degree : {1, 2, 3}) add(dwell_course(log_, of, degree));
     for (const CourseOf of : {CourseOf::one, CourseOf::step}) add(ring_down(of));
+    for (const EventShape shape : {EventShape::step, EventShape::window})
+      add(event_of_dwells(shape));
+    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
+      add(swinging_angle(angle));
+    for (const DriverPointer& column : columns_) add(line_of_column(column));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
       for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
         add(head_decay(angle, of));
@@ -110,6 +120,8 @@ class TermList {
 
  private:
   void add(std::unique_ptr<SmoothTerm> term) { terms_.push_back(std::move(term)); }
+  /// Of the base, towards a direction of its own.
+  void add_tilt(std::unique_ptr<SmoothTerm> of_h) { add(towards_a_direction(std::move(of_h))); }
   /// A variable that never varied drives nothing.
   template <class Use>
   void for_each(std::vector<Driver> drivers, const Use& use) {
@@ -158,6 +170,7 @@ class TermList {
         for (std::size_t second = other; second < kAxisCount; ++second)
           add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add_polynomials(driver, kRoll, {1, 2, 3});
+      for (const int degree : {1, 2, 3}) add_tilt(polynomial(driver, kTilt, degree));
       add_polynomials(driver, kSkew, {1, 2});
     }
     if (clock || column)
@@ -175,6 +188,7 @@ class TermList {
     for (const Target& target : {kBias, kScale}) add_steps(driver, target);
     for (const Target& target : {kBias, kScale})
       for (const OfPlay of : {OfPlay::lag, OfPlay::follower}) add(play(driver, target, of));
+    add(power_beyond(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 10}));
     add(saw_tooth(driver, kBias));  // a compensation that goes by steps
   }
@@ -199,6 +213,11 @@ class TermList {
       add_steps(clock, target);
       add(decay(clock, target));
     }
+    for (const StepEdge edge : {StepEdge::sharp, StepEdge::gradual})
+      add_tilt(step(clock, kTilt, edge));
+    add_tilt(decay(clock, kTilt));
+    add_tilt(logarithm(clock, kTilt));
+    add_tilt(wave(clock, kTilt, {1.5, 0.5, 20}));
     for (std::size_t other = 1; other < kAxisCount; ++other)
       add(step(clock, {.form = TermForm::scale, .other = other}, StepEdge::sharp));
   }
@@ -212,6 +231,7 @@ class TermList {
       for (std::size_t second = other + 1; second < kAxisCount; ++second)
         add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
     for (const Target& target : {kBias, kScale}) add(bend(driver, target));
+    add(gain_beyond(driver, kBias));
     add_steps(driver, kBias);
     add(bell(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 20}));
@@ -222,6 +242,7 @@ class TermList {
   void add_of_angle(const DriverPointer& angle) {
     add_polynomials_of_others(angle, {2, 3});
     for (const Target& target : {kDelta, kH}) add(one_position(angle, target));
+    for (const Target& target : {kDelta, kH}) add(thrown(angle, target));
     for (const Target& target : {kBias, kDelta, kH}) {
       add(bell(angle, target));
       add(sector(angle, target));
@@ -266,6 +287,8 @@ class TermList {
         add(line_times_harmonic(driver, angle, kBias));
         add(line_times_harmonic(driver, angle, angle->angle ? kDelta : kH));
       }
+    // What the weight does to a wheel grows with its moment about the axis, which need be no line.
+    if (angles_.size() == 2) add(parabola_times_harmonic(angles_[1], angles_[0], kDelta));
     for (std::size_t one = 0; one < columns_.size(); ++one)
       for (std::size_t other = one + 1; other < columns_.size(); ++other)
         add(line_times_line(columns_[one], columns_[other], kBias));

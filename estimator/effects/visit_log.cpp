@@ -27,25 +27,27 @@ double mean_of(const std::vector<double>& column, const Pose& pose) {
 double quiet_scatter_V(const MeasurementSet& set, std::size_t axis) {
   const std::vector<double>& u_V = set.samples.u_V[axis];
   std::vector<double> variance_V2;
-  double readings = 0;
   for (const Pose& pose : set.poses) {
     if (pose.count < 2) continue;
     const Eigen::Map<const Eigen::ArrayXd> dwell(u_V.data() + pose.first,
                                                  static_cast<Eigen::Index>(pose.count));
-    variance_V2.push_back((dwell - dwell.mean()).square().sum() /
-                          static_cast<double>(pose.count - 1));
-    readings = static_cast<double>(pose.count);
+    // Quartile of χ²/dof (Wilson & Hilferty, 1931).
+    const double dof = static_cast<double>(pose.count - 1), spread = 2 / (9 * dof);
+    const double quartile = std::pow(1 - spread - 0.674 * std::sqrt(spread), 3);
+    variance_V2.push_back((dwell - dwell.mean()).square().sum() / (dof * quartile));
   }
   if (variance_V2.empty()) return 0;
   const auto quarter = variance_V2.begin() + std::ssize(variance_V2) / 4;
   std::nth_element(variance_V2.begin(), quarter, variance_V2.end());
-  // Quartile of χ²/dof (Wilson & Hilferty, 1931).
-  const double spread = 2 / (9 * (readings - 1));
-  return std::sqrt(*quarter / std::pow(1 - spread - 0.674 * std::sqrt(spread), 3));
+  return std::sqrt(*quarter);
 }
 
-/// What the 12-parameter model leaves of the means, by plain least squares.
-Eigen::VectorXd left_by_twelve_V(const VisitLog& log, std::size_t axis) {
+/// The 12-parameter model of one axis by plain least squares.
+struct PlainFit {
+  Eigen::Vector4d value;   ///< K_x, K_y, K_z, U_0
+  Eigen::VectorXd left_V;  ///< of the means
+};
+PlainFit plain_fit(const VisitLog& log, std::size_t axis) {
   Eigen::MatrixXd A(std::ssize(log.visits), 4);
   Eigen::VectorXd mean_V(A.rows());
   for (Eigen::Index k = 0; k < A.rows(); ++k) {
@@ -53,7 +55,24 @@ Eigen::VectorXd left_by_twelve_V(const VisitLog& log, std::size_t axis) {
     A.row(k) << specific_force_g({visit.delta_rad, visit.h_rad}, log.gamma).transpose(), 1;
     mean_V(k) = visit.mean_V[axis];
   }
-  return mean_V - A * A.colPivHouseholderQr().solve(mean_V);
+  const Eigen::Vector4d value = A.colPivHouseholderQr().solve(mean_V);
+  return {value, mean_V - A * value};
+}
+
+/// What a small turn of one angle of the head adds to the output of an axis at every visit, over
+/// its noise.
+Eigen::VectorXd by_angle(const VisitLog& log, std::size_t axis, const Eigen::Vector4d& value,
+                         Eigen::Vector3d SpecificForce::*d_angle) {
+  Eigen::VectorXd slope(std::ssize(log.visits));
+  for (Eigen::Index k = 0; k < slope.size(); ++k) {
+    const Visit& visit = log.visits[static_cast<std::size_t>(k)];
+    const SpecificForce force =
+        specific_force(visit.delta_rad / kRadPerDeg, visit.h_rad / kRadPerDeg, log.gamma);
+    slope(k) = value.head<3>().dot(force.*d_angle);
+  }
+  const double variance_V2 = log.sample_sd_V[axis] * log.sample_sd_V[axis];
+  return variance_V2 > 0 ? Eigen::VectorXd(slope / variance_V2)
+                         : Eigen::VectorXd::Zero(slope.size());
 }
 
 /// What is removed as slow leaves of a strong line that hardly changes within a dwell what looks
@@ -88,7 +107,7 @@ bool is_missed(const StuckBit& stuck, const VisitLog& log, const MeasurementSet&
   constexpr double kNothing = 20;  // times what is left
   if (stuck.is_jumped_over) return true;
   const double weight_V = std::ldexp(log.adc->lsb_V(), stuck.bit);
-  const Eigen::VectorXd left_V = left_by_twelve_V(log, axis);
+  const Eigen::VectorXd left_V = plain_fit(log, axis).left_V;
   const double left_rms_V = std::sqrt(left_V.squaredNorm() / static_cast<double>(left_V.size()));
   return weight_V < kSmooth * white_scatter_V(set, axis) || weight_V < kNothing * left_rms_V;
 }
@@ -126,24 +145,34 @@ Eigen::MatrixXd step_contrasts(std::size_t samples) {
   return contrasts;
 }
 
-Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<DwellLine>>& lines) {
+Eigen::MatrixXd contrasts_of(const Visit& visit, const VisitLog& log) {
   Eigen::MatrixXd contrasts = step_contrasts(visit.count);
-  for (const auto& line : lines) {
-    if (!line) continue;
+  const auto add = [&](Eigen::VectorXd column) {
+    constexpr double kResolved = 1e-3;  // of its length, beside the columns before it
+    const double length = column.norm();
+    column.array() -= column.mean();
+    for (int twice = 0; twice < 2; ++twice) column -= contrasts * (contrasts.transpose() * column);
+    const bool resolved = column.norm() > kResolved * length;
+    contrasts.conservativeResize(Eigen::NoChange, contrasts.cols() + 1);
+    contrasts.rightCols<1>() =
+        resolved ? column.normalized().eval() : Eigen::VectorXd::Zero(contrasts.rows()).eval();
+  };
+  const auto add_line = [&](const std::optional<DwellLine>& line) {
+    if (!line) return;
     const Eigen::ArrayXd phase =
         2 * std::numbers::pi * line->f_hz * visit.step_s *
         Eigen::ArrayXd::LinSpaced(contrasts.rows(), 0, static_cast<double>(visit.count - 1));
-    for (Eigen::VectorXd column : {phase.sin().matrix().eval(), phase.cos().matrix().eval()}) {
-      constexpr double kResolved = 1e-3;  // of its length, beside the columns before it
-      const double length = column.norm();
-      column.array() -= column.mean();
-      for (int twice = 0; twice < 2; ++twice)
-        column -= contrasts * (contrasts.transpose() * column);
-      const bool resolved = column.norm() > kResolved * length;
-      contrasts.conservativeResize(Eigen::NoChange, contrasts.cols() + 1);
-      contrasts.rightCols<1>() =
-          resolved ? column.normalized().eval() : Eigen::VectorXd::Zero(contrasts.rows()).eval();
-    }
+    add(phase.sin().matrix());
+    add(phase.cos().matrix());
+  };
+  for (const auto& line : log.line) add_line(line);
+  for (const auto& line : {log.delta_line, log.h_line}) add_line(line);
+  for (const auto& event : log.event) {
+    if (!event) continue;
+    Eigen::VectorXd course(contrasts.rows());
+    for (Eigen::Index m = 0; m < course.size(); ++m)
+      course(m) = event->contains(static_cast<std::size_t>(m)) ? 1 : 0;
+    add(std::move(course));
   }
   return contrasts;
 }
@@ -242,7 +271,8 @@ double VisitLog::step_V(std::size_t axis) const {
 }
 
 bool VisitLog::is_coarse() const {
-  if (!adc || visits.front().count < 2) return false;
+  const auto tells_noise = [](const Visit& visit) { return visit.count > 1; };
+  if (!adc || std::none_of(visits.begin(), visits.end(), tells_noise)) return false;
   for (std::size_t i = 0; i < kAxisCount; ++i)
     if (is_coarse_against(step_V(i), sample_sd_V[i])) return true;
   return false;
@@ -302,6 +332,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     if (std::all_of(log.codes.begin(), log.codes.end(), rounds_or_lacks_the_lowest_bit))
       for (CodeFaults& codes : log.codes) codes.stuck_bits.clear();
   }
+  PerAxis<Eigen::VectorXd> by_delta, by_h;
   parallel_for(kAxisCount, [&](std::size_t i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
     if (log.adc) log.input_sd_V[i] = input_scatter_V(set, log, i);
@@ -309,15 +340,20 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     const auto [low, high] = std::minmax_element(samples.u_V[i].begin(), samples.u_V[i].end());
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
-    log.line[i] =
-        stronger(line_through_dwells(set, i), line_between_dwells(set, left_by_twelve_V(log, i)));
+    const PlainFit fit = plain_fit(log, i);
+    by_delta[i] = by_angle(log, i, fit.value, &SpecificForce::d_delta_g_per_rad);
+    by_h[i] = by_angle(log, i, fit.value, &SpecificForce::d_h_g_per_rad);
+    log.event[i] = event_in_dwells(set, i);
+    log.line[i] = stronger(line_through_dwells(set, i), line_between_dwells(set, fit.left_V));
     if (!log.line[i]) return;
     log.line_V2[i] = between_samples_V2(*log.line[i], log.visits.front().step_s);
     if (is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
   });
+  log.delta_line = line_of_angle(set, by_delta);
+  log.h_line = line_of_angle(set, by_h);
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))
-      log.contrasts.emplace(visit.count, contrasts_of(visit, log.line));
+      log.contrasts.emplace(visit.count, contrasts_of(visit, log));
   return log;
 }
 

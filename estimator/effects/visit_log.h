@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "estimator/effects/code_evidence.h"
+#include "estimator/effects/dwell_event.h"
 #include "estimator/effects/dwell_line.h"
 #include "estimator/kinematics.h"
 #include "estimator/measurement.h"
@@ -55,11 +56,13 @@ struct VisitLog {
   PerAxis<double> smallest_step_V{};        ///< smallest difference between two different readings
   PerAxis<double> lowest_V{}, highest_V{};  ///< of all readings
   std::optional<Adc> adc;
-  bool goes_as_commanded = false;          ///< RunDescription's
-  PerAxis<std::optional<DwellLine>> line;  ///< that runs through the dwells
+  bool goes_as_commanded = false;               ///< RunDescription's
+  PerAxis<std::optional<DwellLine>> line;       ///< that runs through the dwells
+  std::optional<DwellLine> delta_line, h_line;  ///< as if an angle of the head swung
+  PerAxis<std::optional<DwellEvent>> event;     ///< in every dwell
   /// What is looked for within a dwell beside its mean, for every number of samples that occurs:
   /// samples × dwell_contrasts(), orthonormal columns of zero sum; what a dwell cannot resolve is
-  /// zero. The first are step_contrasts(); then come sine and cosine of every line.
+  /// zero. The first are step_contrasts(); then come sine and cosine of every line and every event.
   std::map<std::size_t, Eigen::MatrixXd> contrasts;
 
   /// Visits in front that belong to an earlier set, whether the head stood elsewhere since, and
@@ -115,8 +118,9 @@ std::array<int, 3> direction_after(const Visit& before, double delta_rad);
 /// a move are fastest; columns that a short dwell cannot resolve are zero.
 Eigen::MatrixXd step_contrasts(std::size_t samples);
 
-/// The contrasts of a visit's dwell: VisitLog::contrasts says which.
-Eigen::MatrixXd contrasts_of(const Visit& visit, const PerAxis<std::optional<DwellLine>>& lines);
+/// The contrasts of a visit's dwell: VisitLog::contrasts says which. Precondition: the lines and
+/// events of the log are known.
+Eigen::MatrixXd contrasts_of(const Visit& visit, const VisitLog& log);
 
 /// Without angles those of the visits are zero. `bands`: what there is of lines near them is part
 /// of the noise. Precondition: every pose has a sample.

@@ -11,7 +11,7 @@ using ExtendedMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic
 using ExtendedVector = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
 using Factorisation = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>;
 
-/// Full-rank solution with R, then one correction of [I A; Aᵀ 0]·[r; x] = [b; 0].
+/// Full-rank solution with R, then two corrections of [I A; Aᵀ 0]·[r; x] = [b; 0].
 struct Refined {
   Eigen::VectorXd x;
   Eigen::VectorXd residual;

@@ -22,7 +22,7 @@ struct LeastSquaresResult {
 };
 
 /// Solves with unit column norms and a column-pivoted Householder factorisation, then refines the
-/// solution of the augmented system once with residuals in extended precision (Björck 1967). The
+/// solution of the augmented system twice with residuals in extended precision (Björck 1967). The
 /// normal equations are never formed.
 /// Shapes: A n × p with n ≥ 1, p ≥ 1; b n. Rank deficiency is a value of the result, not an error.
 LeastSquaresResult solve_least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,

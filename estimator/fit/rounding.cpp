@@ -73,16 +73,17 @@ double sigma_at(const Eigen::ArrayXd& values, double recorded_variance, double u
 
 /// The readings of which these are the means, in steps from a code, of noise so small that they
 /// share two neighbouring codes at most.
-std::vector<CodeCounts> counts_of_means(const Eigen::VectorXd& mean, double samples_per_mean) {
+std::vector<CodeCounts> counts_of_means(const Eigen::VectorXd& mean,
+                                        const Eigen::VectorXd& readings) {
   std::vector<CodeCounts> all;
-  for (const double value : mean) {
+  for (Eigen::Index k = 0; k < mean.size(); ++k) {
     CodeCounts codes;
-    codes.mean = value;
+    codes.mean = mean(k);
     // Whole readings: files round the voltages of the codes.
-    const double readings = std::round(value * samples_per_mean);
-    const double lower = std::floor(readings / samples_per_mean);
-    const double above = readings - lower * samples_per_mean;
-    if (above < samples_per_mean) codes.count.emplace_back(lower, samples_per_mean - above);
+    const double sum = std::round(mean(k) * readings(k));
+    const double lower = std::floor(sum / readings(k));
+    const double above = sum - lower * readings(k);
+    if (above < readings(k)) codes.count.emplace_back(lower, readings(k) - above);
     if (above > 0) codes.count.emplace_back(lower + 1, above);
     all.push_back(std::move(codes));
   }
@@ -98,14 +99,13 @@ constexpr double kSoftest = 0.15;
 /// Where steps keep their edges: the voltages from how many readings are on which side of them.
 /// Noise of a reading in steps, as recorded and before rounding.
 CodeSites within_edges(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
-                       const CodeScale& scale, double samples_per_mean, double recorded,
+                       const CodeScale& scale, const Eigen::VectorXd& readings, double recorded,
                        double uniform_sigma) {
   constexpr double kLeastSigma = 0.002;
   const Eigen::VectorXd mean = (mean_V.array() - scale.origin_V) / scale.step_V;
   const Eigen::VectorXd expected = (expected_V.array() - scale.origin_V) / scale.step_V;
   const double sigma = sigma_at(expected.array(), recorded * recorded, uniform_sigma, 0.0);
-  return sites_about(expected, counts_of_means(mean, samples_per_mean),
-                     std::max(sigma, kLeastSigma));
+  return sites_about(expected, counts_of_means(mean, readings), std::max(sigma, kLeastSigma));
 }
 
 }  // namespace
@@ -153,8 +153,8 @@ Eigen::VectorXd expected_from_others(const Eigen::MatrixXd& covariance,
 }
 
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
-                              const CodeScale& scale, double sample_sd_V, double samples_per_mean,
-                              double line_V2) {
+                              const CodeScale& scale, double sample_sd_V,
+                              const Eigen::VectorXd& readings, double line_V2) {
   constexpr double kLeastNoise = 0.01;  // of the square: how large a line is, is not known better
   const double step_V = scale.step_V, origin_V = scale.origin_V;
   const double recorded_V2 = sample_sd_V * sample_sd_V;
@@ -165,11 +165,12 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
   if (sigma_V > kNoTrace * step_V) return {mean_V, Eigen::VectorXd::Zero(n), false};
 
   const double full_V2 = rounding_variance(step_V, sigma_V);
-  const double mean_white_V2 = noise_share * recorded_V2 / samples_per_mean;
-  RoundingFree result{mean_V, Eigen::VectorXd::Constant(n, full_V2 + mean_white_V2), true};
+  const Eigen::VectorXd white_V2_of = noise_share * recorded_V2 * readings.cwiseInverse();
+  const double mean_white_V2 = white_V2_of.mean();
+  RoundingFree result{mean_V, (white_V2_of.array() + full_V2).matrix(), true};
   if (sigma_V < kSoftest * step_V) {
-    const CodeSites sites = within_edges(mean_V, expected_V, scale, samples_per_mean,
-                                         sample_sd_V / step_V, sigma_V / step_V);
+    const CodeSites sites =
+        within_edges(mean_V, expected_V, scale, readings, sample_sd_V / step_V, sigma_V / step_V);
     result.mean_V = (origin_V + step_V * sites.mean.array()).matrix();
     result.variance_V2 = step_V * step_V * sites.variance;
     result.beyond_V2 = full_V2 + mean_white_V2 - result.variance_V2.mean();
@@ -196,7 +197,7 @@ RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::Vector
           rounding_bias(expected_V(k), origin_V, step_V, std::sqrt(white_V2 + slow_V2));
       const double slope = std::max(1 + bias.slope, kFlattest);
       const double off_V = mean_V(k) - expected_V(k) - bias.bias;
-      const double white_mean_V2 = noise_share * step_V * step_V / samples_per_mean *
+      const double white_mean_V2 = noise_share * step_V * step_V / readings(k) *
                                    rounded_variance((expected_V(k) - origin_V) / step_V,
                                                     sigma_V / step_V, std::sqrt(slow_V2) / step_V);
       // Far from the expectation the slope there says nothing: rounding moves no mean further than

@@ -38,13 +38,13 @@ struct RoundingFree {
 /// is left is a known function of the voltage (Widrow & Kollár, Quantization Noise). It is undone
 /// to first order about `expected_V`, what a model expects of the means; near the middle of a step
 /// a mean says little, and its variance grows. `sample_sd_V`: white noise of one reading as
-/// recorded. The scatter of the means about the expectation says how well the place within the step
-/// is known; a model that lacks an effect gets no correction and the whole variance of rounding.
-/// `line_V2`: what part of the square of sample_sd_V is a line, which rounds steps off as noise
-/// does but does not add to the variance of a mean.
+/// recorded; `readings`: how many each mean is of. The scatter of the means about the expectation
+/// says how well the place within the step is known; a model that lacks an effect gets no
+/// correction and the whole variance of rounding. `line_V2`: what part of the square of sample_sd_V
+/// is a line, which rounds steps off as noise does but does not add to the variance of a mean.
 RoundingFree free_of_rounding(const Eigen::VectorXd& mean_V, const Eigen::VectorXd& expected_V,
-                              const CodeScale& scale, double sample_sd_V, double samples_per_mean,
-                              double line_V2 = 0);
+                              const CodeScale& scale, double sample_sd_V,
+                              const Eigen::VectorXd& readings, double line_V2 = 0);
 
 /// What a static record says of the noise of other places when rounding matters: nothing of white
 /// noise, which depends on the place within the step, and of slow noise only where the record's

@@ -17,7 +17,7 @@ namespace {
 
 constexpr Eigen::Index kFewestSpans = 40;
 constexpr Eigen::Index kMostSpans = 160;
-constexpr std::size_t kFewestSamples = 8;  // of a span
+constexpr std::size_t kFewestOfSpan = 8;  // of a span
 // Of −2 ln L: one column in a thousand that has nothing to do with the record.
 constexpr double kClearly = 11;
 // What an answer must gain besides that is one of many.
@@ -225,7 +225,7 @@ std::vector<std::string> take_out_columns(std::vector<double>& record, const Sam
   assert(first + record.size() <= table.size() && step_s > 0);
   Spans spans;
   spans.samples = static_cast<Eigen::Index>(
-      std::max(kFewestSamples, record.size() / static_cast<std::size_t>(kMostSpans)));
+      std::max(kFewestOfSpan, record.size() / static_cast<std::size_t>(kMostSpans)));
   spans.count = std::ssize(record) / spans.samples;
   Eigen::Map<Eigen::VectorXd> u(record.data(), std::ssize(record));
   if (spans.count < kFewestSpans || !u.allFinite()) return {};

@@ -15,6 +15,7 @@ namespace plumbline {
 namespace {
 
 using testing::HasSubstr;
+using testing::SizeIs;
 
 TEST(Calibrate, FindsTheUnitAndItsNoise) {
   const SyntheticRun data = synthetic_run(1, kSixteenBits);
@@ -172,6 +173,26 @@ TEST(Calibrate, DwellsMayDifferInLength) {
     const Calibration result = calibrated(data);
     EXPECT_EQ(result.diagnosis.verdict, Verdict::clean) << result.diagnosis.reason;
   }
+}
+
+// How sure the means of a coarse converter are was told from the length of the first dwell.
+TEST(Calibrate, AShortFirstDwellSaysNothingOfTheOthers) {
+  constexpr Adc kEightBits{8, -5, 0};  // a step of 20 mV
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.samples_per_pose = 40;
+  options.sigma_V = 4e-3;
+  options.k2_x_V_per_g2 = 6e-3;
+  const SyntheticRun data = synthetic_run(2, kEightBits, options);
+  SyntheticRun cut = data;
+  cut.run.poses.front().count = 2;
+  const Calibration whole = calibrated(data), shorter = calibrated(cut);
+  ASSERT_THAT(whole.diagnosis.effects, SizeIs(1)) << whole.diagnosis.reason;
+  ASSERT_THAT(shorter.diagnosis.effects, SizeIs(1)) << shorter.diagnosis.reason;
+  const EffectParameter &k2 = whole.diagnosis.effects[0].parameters[0],
+                        &k2_of_shorter = shorter.diagnosis.effects[0].parameters[0];
+  EXPECT_EQ(shorter.diagnosis.effects[0].id, "sensor.quadratic");
+  EXPECT_NEAR(k2_of_shorter.u, k2.u, 0.1 * k2.u);
 }
 
 TEST(Calibrate, OneReadingAPose) {

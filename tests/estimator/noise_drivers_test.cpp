@@ -65,6 +65,17 @@ TEST(NoiseDrivers, NoiseOfWhatWasSwitchedOn) {
   expect_noise_of_x(calibrated(synthetic_run(4, kSixteenBits, options)), "t_s", "noise, step", 2);
 }
 
+// As a parabola of a_z.
+TEST(NoiseDrivers, NoiseThatWasThereForAWhile) {
+  SyntheticOptions options = fine_grid();
+  constexpr int kFirst = 60, kLast = 120;  // arrivals
+  options.noise_x = [arrivals = 0](const auto&, double since_s) mutable {
+    if (since_s == 0) ++arrivals;
+    return arrivals > kFirst && arrivals <= kLast ? 2 : 1;
+  };
+  expect_noise_of_x(calibrated(synthetic_run(4, kSixteenBits, options)), "t_s", "noise, window", 2);
+}
+
 // Poses with less noise say more: with all alike the parameters err by half as much again.
 TEST(NoiseDrivers, QuietPosesCountForMore) {
   SyntheticOptions options = fine_grid();

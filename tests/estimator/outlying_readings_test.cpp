@@ -56,6 +56,14 @@ TEST(OutlyingReadings, SettlingIsNone) {
   EXPECT_THAT(rows(outlying_readings(set, 0, {})), testing::ElementsAre(500));
 }
 
+TEST(OutlyingReadings, WhatComesInEveryDwellIsNone) {
+  MeasurementSet set = noisy_set(1);
+  for (const Pose& pose : set.poses) set.samples.u_V[0][pose.first + 23] += 0.1;
+  EXPECT_THAT(outlying_readings(set, 0, {}), testing::IsEmpty());
+  set.samples.u_V[0][500] += 0.1;  // the 20th of a dwell
+  EXPECT_THAT(rows(outlying_readings(set, 0, {})), testing::ElementsAre(500));
+}
+
 TEST(OutlyingReadings, AStepWithinADwellIsNone) {
   MeasurementSet set = noisy_set(1);
   for (std::size_t k = 400 + 37; k < 440; ++k) set.samples.u_V[0][k] += 0.1;

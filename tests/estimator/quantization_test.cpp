@@ -132,7 +132,8 @@ TEST(RoundingFree, OneReadingOfWiderNoiseIsNoErrorOfItsPose) {
   static_assert(far * 0.137 - 10 < 0.002);
   mean_V(far) += step_V / kReadings;
   const RoundingFree free =
-      free_of_rounding(mean_V, expected_V, scale_of(adc), std::sqrt(square) * step_V, kReadings);
+      free_of_rounding(mean_V, expected_V, scale_of(adc), std::sqrt(square) * step_V,
+                       Eigen::VectorXd::Constant(mean_V.size(), kReadings));
   ASSERT_TRUE(free.coarse);
   EXPECT_LT(std::abs(free.mean_V(far) - expected_V(far)), 2 * std::sqrt(free.variance_V2(far)));
 }
@@ -150,7 +151,8 @@ TEST(RoundingFree, MovesNoMeanByMoreThanRoundingDoes) {
   }
   expected_V(0) = -2.5;  // in the middle of a code
   mean_V(0) = -2.5 + 0.7 * step_V;
-  const RoundingFree free = free_of_rounding(mean_V, expected_V, scale_of(adc), 0.36 * step_V, 50);
+  const RoundingFree free = free_of_rounding(mean_V, expected_V, scale_of(adc), 0.36 * step_V,
+                                             Eigen::VectorXd::Constant(200, 50));
   ASSERT_TRUE(free.coarse);
   EXPECT_LT(std::abs(free.mean_V(0) - mean_V(0)), 0.2 * step_V);
 }
@@ -162,9 +164,11 @@ TEST(RoundingFree, ALineInTheReadingsIsNoNoiseOfTheirMeans) {
   const double step_V = adc.lsb_V(), sample_sd_V = 0.6 * step_V;
   Eigen::VectorXd mean_V(200);
   for (Eigen::Index k = 0; k < 200; ++k) mean_V(k) = -2.5 + step_V * 0.137 * static_cast<double>(k);
-  const RoundingFree noise = free_of_rounding(mean_V, mean_V, scale_of(adc), sample_sd_V, 50);
-  const RoundingFree line = free_of_rounding(mean_V, mean_V, scale_of(adc), sample_sd_V, 50,
-                                             kOfLine * sample_sd_V * sample_sd_V);
+  const RoundingFree noise = free_of_rounding(mean_V, mean_V, scale_of(adc), sample_sd_V,
+                                              Eigen::VectorXd::Constant(200, 50));
+  const RoundingFree line =
+      free_of_rounding(mean_V, mean_V, scale_of(adc), sample_sd_V,
+                       Eigen::VectorXd::Constant(200, 50), kOfLine * sample_sd_V * sample_sd_V);
   ASSERT_TRUE(noise.coarse);
   EXPECT_NEAR(noise.variance_V2.mean(), sample_sd_V * sample_sd_V / 50,
               0.1 * noise.variance_V2.mean());
@@ -211,8 +215,8 @@ TEST(RoundingFree, MeansInsideAStepWithEdgesCountForLittle) {
     mean_V(k) = std::round(1e5 * (adc.volts(7) + step_V * sum / kReadings)) / 1e5;
   }
   const double recorded_V = step_V * std::sqrt(sigma * 0.56);
-  const RoundingFree free =
-      free_of_rounding(mean_V, expected_V, scale_of(adc), recorded_V, kReadings);
+  const RoundingFree free = free_of_rounding(mean_V, expected_V, scale_of(adc), recorded_V,
+                                             Eigen::VectorXd::Constant(mean_V.size(), kReadings));
   ASSERT_TRUE(free.coarse);
   ASSERT_TRUE(free.beyond_V2);
   const double sd_in_the_middle = std::sqrt(free.variance_V2(kMeans / 2)) / step_V;

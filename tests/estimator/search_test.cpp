@@ -216,5 +216,21 @@ TEST(Search, WhatEveryPoseHasForItselfHasNoDriver) {
   }
 }
 
+// The sine of it is zero at every position, and a fit of both is not determined: it was found by
+// another name.
+TEST(Search, APeriodicErrorWithTwoPositionsAPeriodHasItsName) {
+  SyntheticOptions options;
+  options.delta_step_deg = 20;
+  options.h_step_deg = 10;
+  options.delta_error_deg = [](double delta_deg, double) {
+    return 0.15 * std::cos(9 * delta_deg * std::numbers::pi / 180);
+  };
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  ASSERT_THAT(result.diagnosis.effects, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.effects.front().id, "rig.delta_periodic");
+}
+
 }  // namespace
 }  // namespace plumbline

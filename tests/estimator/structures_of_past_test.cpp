@@ -206,5 +206,41 @@ TEST(Structure, ALoopLikeALeafIsHysteresisLessWhatTheSquareOfTheForceTakes) {
   EXPECT_LT(result.after.heldout_pose_rms_mps2[0], 1.3 * result.floor_pose_rms_mps2[0]);
 }
 
+// As a lag behind a play, a saw tooth of the codes, and noise that wanders.
+TEST(Structure, AFlexureThatSnapsIsARelay) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[1] = [seat = 1.0](const auto& a_g, double t_s) mutable {
+    if (t_s > 61 && a_g[1] > 0.45) seat = 1;
+    if (t_s > 61 && a_g[1] < -0.45) seat = -1;
+    return 5e-4 * seat;
+  };
+  expect_only_structure(options, {"previous_pose", "bias", "relay"});
+}
+
+// As the size of the turn, and scales that follow it.
+TEST(Structure, WhatTheMotorsWarmOnTheWayGrowsWithItsTime) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  double at_deg = 0, at_h_deg = 0, way_s = 0;
+  options.pose_s = [&](double delta_deg, double h_deg) {
+    // Whichever axis takes longer; the next pose is not known yet: each waits for the last way.
+    const double next_s = 2 + std::max(std::abs(std::remainder(delta_deg - at_deg, 360)) / 40,
+                                       std::abs(h_deg - at_h_deg) / 12);
+    at_deg = delta_deg;
+    at_h_deg = h_deg;
+    return next_s;
+  };
+  options.more_V[0] = [&, last_s = 0.0](const auto&, double t_s) mutable {
+    if (t_s > 61 && t_s - last_s > 1) way_s = t_s - last_s;
+    last_s = t_s;
+    return 1e-4 * way_s;
+  };
+  expect_only_structure(options,
+                        {"previous_pose", "bias", "polynomial of degree 1 in the time on the way"});
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -346,5 +346,37 @@ TEST(Structure, ACrossSensitivityThatJumpsIsAScale) {
   expect_only_structure(options, {"t_s", "scale", "step, times the component of the next axis"});
 }
 
+// As a saw tooth and a bend.
+TEST(Structure, AnAmplifierThatChangesItsRangeHasAnotherGainBeyond) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_V[1] = [](const auto& a_g, double) {
+    return std::abs(a_g[1]) > 0.55 ? 8e-4 * a_g[1] : 0.0;
+  };
+  expect_only_structure(options, {"a_y", "bias", "gain beyond a value"});
+}
+
+// As two steps of the humidity.
+TEST(Structure, WhatLeaksBeyondSomeHumidityIsAPowerOfTheRest) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  const auto humidity = [](double t_s) { return 48 + 5 * std::sin(t_s / 70); };
+  options.more_V[2] = [=](const auto&, double t_s) {
+    return 2e-4 * std::pow(std::max(0.0, humidity(t_s) - 49), 1.5);
+  };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  Covariate column{"rh_pct", {}};
+  for (const double t_s : data.run.samples.t_s) column.value.push_back(humidity(t_s));
+  data.run.samples.covariates = {column};
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, "rh_pct");
+  EXPECT_EQ(found.form, "bias");
+  EXPECT_EQ(found.shape, "power beyond a value");
+}
+
 }  // namespace
 }  // namespace plumbline

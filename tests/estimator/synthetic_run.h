@@ -23,12 +23,15 @@ struct SyntheticOptions {
   bool varied_dwells = false;  ///< every second pose has half as many
   bool random_order = false;
   double still_s = 60;  ///< length of the record
+  /// From the beginning of one pose to that of the next, s, at a position.
+  std::function<double(double delta_deg, double h_deg)> pose_s = {};
   int delta_step_deg = 30;
   int h_step_deg = 20;
   double k2_x_V_per_g2 = 0;  ///< a quadratic that the model does not know
   /// Anything else that an axis does, V, of the specific force in g and the time in s.
   PerAxis<std::function<double(const std::array<double, 3>&, double)>> more_V = {};
-  std::function<double(double)> base_roll_rad = {};  ///< at a time in s
+  /// Of the base about x_b, and about y_b, at a time in s.
+  std::function<double(double)> base_roll_rad = {}, base_tilt_rad = {};
   /// By how much the noise of x is larger, of the specific force in g and the time since arrival in
   /// s.
   std::function<double(const std::array<double, 3>&, double)> noise_x = {};
@@ -68,7 +71,8 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
       return error ? error(to_delta_deg, to_h_deg) : 0;
     };
     const double delta_deg = to_delta_deg + error_deg(options.delta_error_deg);
-    const double h_deg = to_h_deg + error_deg(options.h_error_deg);
+    const double h_deg = to_h_deg + error_deg(options.h_error_deg) +
+                         (options.base_tilt_rad ? options.base_tilt_rad(t_s) / kRadians : 0);
     const double c = std::cos(h_deg * kRadians);
     const double roll_rad = (options.base_roll_rad ? options.base_roll_rad(t_s) : 0) +
                             error_deg(options.roll_error_deg) * kRadians;
@@ -106,7 +110,7 @@ inline SyntheticRun synthetic_run(std::uint64_t seed, const Adc& adc,
     arrival_s = t_s;
     for (std::size_t i = 0; i < count; ++i)
       add_sample(result.run.samples, t_s + static_cast<double>(i) / kRate_hz, delta, h);
-    t_s += 3;
+    t_s += options.pose_s ? options.pose_s(delta, h) : 3;
   }
   return result;
 }

@@ -119,8 +119,9 @@ TrialErrors estimate(const CodeCase& c, std::uint64_t seed) {
 
   Estimate first{plain.x, plain.cofactor};
   for (int round = 0; round < 3; ++round) {
-    const RoundingFree free = free_of_rounding(trial.mean_V, trial.A * first.value, scale_of(kAdc),
-                                               trial.sample_sd_V, c.readings);
+    const RoundingFree free =
+        free_of_rounding(trial.mean_V, trial.A * first.value, scale_of(kAdc), trial.sample_sd_V,
+                         Eigen::VectorXd::Constant(kPoses, c.readings));
     const double white_V2 = trial.sample_sd_V * trial.sample_sd_V / c.readings;
     first = weighted(trial.A, free.mean_V,
                      free.coarse ? free.variance_V2 : Eigen::VectorXd::Constant(kPoses, white_V2));

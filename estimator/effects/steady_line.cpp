@@ -1,0 +1,100 @@
+#include "estimator/effects/steady_line.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "estimator/effects/function_of_driver.h"
+
+namespace plumbline {
+namespace {
+
+class SwingingAngle final : public SmoothTerm {
+ public:
+  explicit SwingingAngle(double HeadGeometry::*angle) : angle_(angle) {}
+
+  std::string id() const override { return "unlisted:t_in_pose:geometry"; }
+  const std::string& driver() const override { return driver_; }
+  TermForm form() const override { return TermForm::geometry; }
+  std::string shape() const override {
+    return "sine" + Target{.form = TermForm::geometry, .angle = angle_}.words();
+  }
+  Subject subject() const override { return Subject::head; }
+  bool within_dwell() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"amplitude", "deg", ParameterRole::amplitude},
+            effect::line_frequency(),
+            effect::line_phase()};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    const auto& line = angle_ == &HeadGeometry::delta_rad ? log.delta_line : log.h_line;
+    if (!line || !line->steady) return {};
+    return {{{effect::kSmallAngle_deg, line->f_hz, effect::start_of_phase_deg(*line)}}};
+  }
+  void displace(const VisitLog& log, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    head.*angle_ += p[0] * effect::kRadPerDeg * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
+  }
+  AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
+    return {angle_, p[0] * effect::kRadPerDeg * effect::sine(log.visits[visit], p[1], p[2])};
+  }
+  void normalise(std::vector<double>& p) const override { effect::normalise_sine(p[0], p[2]); }
+
+ private:
+  double HeadGeometry::*angle_;
+  std::string driver_ = "t_in_pose";
+};
+
+class LineOfColumn final : public SmoothTerm {
+ public:
+  explicit LineOfColumn(DriverPointer column) : column_(std::move(column)) {}
+
+  std::string id() const override { return "unlisted:" + column_->name + ":sample"; }
+  const std::string& driver() const override { return column_->name; }
+  TermForm form() const override { return TermForm::sample; }
+  std::string shape() const override { return "straight line, times a sine"; }
+  Subject subject() const override { return Subject::sensor; }
+  bool within_dwell() const override { return true; }
+  std::vector<std::string> columns() const override { return column_->columns(); }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", column_->unit(), ParameterRole::index},
+            {"high", column_->unit(), ParameterRole::index},
+            effect::line_frequency(),
+            effect::line_phase(),
+            {"p0", "g", ParameterRole::amplitude},
+            {"p1", "g", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
+    const auto& line = log.line[axis];
+    const std::vector<double>& value = column_->value[axis];
+    const auto [low, high] = std::minmax_element(value.begin(), value.end());
+    if (!line || !line->steady || !(*high > *low)) return {};
+    return {{{*low, *high, line->f_hz, effect::start_of_phase_deg(*line), effect::kSmallTerm,
+              effect::kSmallTerm}}};
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    return size_g(input, p) * effect::mean_of_sine(input.at(), p[2], p[3]);
+  }
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
+    return size_g(input, p) * effect::sine(input.at(), p[2], p[3]);
+  }
+
+ private:
+  double size_g(const TermInput& input, const double* p) const {
+    const double value = column_->value[input.axis][input.visit];
+    return p[4] + p[5] * (2 * value - p[0] - p[1]) / (p[1] - p[0]);
+  }
+
+  DriverPointer column_;
+};
+
+}  // namespace
+
+std::unique_ptr<SmoothTerm> swinging_angle(double HeadGeometry::*angle) {
+  return std::make_unique<SwingingAngle>(angle);
+}
+std::unique_ptr<SmoothTerm> line_of_column(DriverPointer column) {
+  return std::make_unique<LineOfColumn>(std::move(column));
+}
+
+}  // namespace plumbline

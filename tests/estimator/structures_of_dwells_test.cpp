@@ -1,0 +1,76 @@
+// What has no name and shows within the dwells.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/estimator/structure.h"
+
+namespace plumbline {
+namespace {
+
+using testing::IsEmpty;
+using testing::SizeIs;
+
+SyntheticOptions long_dwells() {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.samples_per_pose = 40;
+  return options;
+}
+
+/// In a synthetic run; negative in the record.
+double since_arrival_s(double t_s) {
+  constexpr double kFirst_s = 61, kPose_s = 3;
+  return t_s < kFirst_s ? -1 : t_s - kFirst_s - kPose_s * std::floor((t_s - kFirst_s) / kPose_s);
+}
+
+// As ringing and a polynomial.
+TEST(Structure, ABrakeThatReleasesInTheDwellIsAStepThere) {
+  SyntheticOptions options = long_dwells();
+  options.more_V[0] = [](const auto&, double t_s) {
+    return since_arrival_s(t_s) > 0.265 ? 3e-4 : 0.0;
+  };
+  const UnlistedStructure found = expect_only_structure(options, {"t_in_pose", "sample", "step"});
+  EXPECT_NEAR(found.parameters[0].value, 0.265, 0.006);
+  EXPECT_NEAR(found.parameters[1].value, 3e-4 / 0.032, 4 * found.parameters[1].u);
+}
+
+// Far beyond the noise: as outlying readings it was left out.
+TEST(Structure, AReadingThatIsDisturbedInEveryDwellIsAWindowThere) {
+  for (const double size_V : {2e-4, 5e-3}) {
+    SyntheticOptions options = long_dwells();
+    options.more_V[2] = [=](const auto&, double t_s) {
+      return std::abs(since_arrival_s(t_s) - 0.23) < 0.005 ? size_V : 0.0;
+    };
+    const UnlistedStructure found =
+        expect_only_structure(options, {"t_in_pose", "sample", "window"});
+    EXPECT_NEAR(found.parameters[0].value, 0.225, 1e-6);
+    EXPECT_NEAR(found.parameters[1].value, 0.235, 1e-6);
+  }
+}
+
+// As pickup by name.
+TEST(Structure, AMachineThatRunsNowAndThenIsALineOfItsColumn) {
+  SyntheticOptions options = long_dwells();
+  options.random_order = true;
+  const auto runs = [](double t_s) { return std::sin(t_s / 40) > 0.2 ? 1.0 : 0.0; };
+  options.more_V[1] = [=](const auto&, double t_s) {
+    return 2e-4 * runs(t_s) * std::sin(2 * std::numbers::pi * 21.7 * t_s);
+  };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  Covariate compressor{"compressor_on", {}};
+  for (const double t_s : data.run.samples.t_s) compressor.value.push_back(runs(t_s));
+  data.run.samples.covariates = {compressor};
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  EXPECT_EQ(result.diagnosis.unlisted[0].driver, "compressor_on");
+  EXPECT_EQ(result.diagnosis.unlisted[0].form, "sample");
+  EXPECT_EQ(result.diagnosis.unlisted[0].shape, "straight line, times a sine");
+}
+
+}  // namespace
+}  // namespace plumbline

@@ -1,0 +1,146 @@
+// What has no name and is the head's: seen by all axes through one angle.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/estimator/structure.h"
+
+namespace plumbline {
+namespace {
+
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr double kRadians = std::numbers::pi / 180;
+
+SyntheticOptions fine_turns() {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  return options;
+}
+
+const EffectParameter& parameter(const UnlistedStructure& found, const char* name) {
+  const auto at = std::find_if(found.parameters.begin(), found.parameters.end(),
+                               [&](const EffectParameter& p) { return p.name == name; });
+  EXPECT_NE(at, found.parameters.end()) << name;
+  return *at;
+}
+
+// As a step of h and a step of the base roll.
+TEST(Structure, ABaseTiltsTowardsADirectionOfItsOwn) {
+  constexpr double kTilt_deg = 0.8, kDirection_deg = 30;
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  const auto slipped = [](double t_s) { return t_s < 280 ? 0 : kTilt_deg * kRadians; };
+  options.base_tilt_rad = [=](double t_s) {
+    return slipped(t_s) * std::cos(kDirection_deg * kRadians);
+  };
+  options.base_roll_rad = [=](double t_s) {
+    return slipped(t_s) * std::sin(kDirection_deg * kRadians);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"t_s", "geometry", "step, added to the tilt of the base"});
+  EXPECT_THAT(found.axes, SizeIs(3));
+  const EffectParameter& direction = parameter(found, "direction");
+  EXPECT_NEAR(direction.value, kDirection_deg, 4 * direction.u);
+  const EffectParameter& size = parameter(found, "p");
+  EXPECT_NEAR(size.value, kTilt_deg, 4 * size.u);
+}
+
+// Little beside h, the roll was nothing of its own but a slip of the index.
+TEST(Structure, ATiltAlmostAlongAnAxisOfTheBaseIsOne) {
+  SyntheticOptions options = fine_turns();
+  const auto course = [](double t_s) { return std::cos(t_s / 90) + 0.6 * std::cos(t_s / 31); };
+  options.base_tilt_rad = [=](double t_s) { return 0.02 * course(t_s); };
+  options.base_roll_rad = [=](double t_s) { return 0.004 * course(t_s); };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  for (const double t_s : data.run.samples.t_s) data.run.samples.temp_C.push_back(21 + course(t_s));
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, "temp_C");
+  EXPECT_EQ(found.shape, "polynomial of degree 1, added to the tilt of the base");
+  const EffectParameter& direction = parameter(found, "direction");
+  EXPECT_NEAR(direction.value, std::atan2(0.004, 0.02) / kRadians, 4 * direction.u);
+}
+
+// As polynomials and waves of the time.
+TEST(Structure, AnArmThatWarmsLateTiltsWithTheAverageOfThePast) {
+  constexpr double kTau_s = 40;
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  // Steady until the run begins, then with a course of its own.
+  const auto coolant_K = [](double t_s) {
+    const double since_s = std::max(0.0, t_s - 61);
+    return 1.5 * std::sin(since_s / 90) - 0.8 * std::sin(since_s / 31);
+  };
+  options.base_tilt_rad = [=, late_K = 0.0, last_s = 0.0](double t_s) mutable {
+    // Called for every reading in turn.
+    constexpr double kStep_s = 0.01;
+    for (; last_s < t_s; last_s += kStep_s)
+      late_K += kStep_s / kTau_s * (coolant_K(last_s) - late_K);
+    return 0.02 * late_K;
+  };
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  Covariate coolant{"coolant_C", {}};
+  for (const double t_s : data.run.samples.t_s) coolant.value.push_back(25 + coolant_K(t_s));
+  data.run.samples.covariates = {coolant};
+  const Calibration result = calibrated(data);
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
+  const UnlistedStructure& found = result.diagnosis.unlisted.front();
+  EXPECT_EQ(found.driver, "coolant_C");
+  EXPECT_EQ(found.form, "geometry");
+  EXPECT_EQ(found.shape, "straight line in the average of the past, added to h");
+  const EffectParameter& tau = parameter(found, "tau");
+  EXPECT_NEAR(tau.value, kTau_s, 4 * tau.u);
+}
+
+// As five periodic errors of the drive, by name.
+TEST(Structure, ALoadThatIsThrownAcrossAPlayIsOne) {
+  SyntheticOptions options = fine_turns();
+  options.delta_error_deg = [](double delta_deg, double) {
+    return 0.6 * std::tanh(8 * std::sin((delta_deg - 33) * kRadians));
+  };
+  expect_only_structure(options,
+                        {"delta_deg", "geometry", "thrown from side to side, added to delta"});
+}
+
+// As a periodic error by name and what of it grows with the cosine of h.
+TEST(Structure, ARunoutThatGrowsWithTheTiltIsOne) {
+  SyntheticOptions options = fine_turns();
+  options.h_step_deg = 10;
+  options.delta_error_deg = [](double delta_deg, double h_deg) {
+    return 0.8 * std::cos(3 * (delta_deg - 20) * kRadians) *
+           std::pow(std::sin(h_deg * kRadians), 2);
+  };
+  expect_only_structure(
+      options, {"h_deg", "geometry", "parabola, times a harmonic of delta_deg, added to delta"});
+}
+
+// As pickup by name, on two axes.
+TEST(Structure, AServoThatHuntsSwingsTheSpindle) {
+  constexpr double kSwing_rad = 5e-3, kFrequency_hz = 17.3;
+  SyntheticOptions options = fine_turns();
+  options.samples_per_pose = 40;
+  const auto swing_rad = [](double t_s) {
+    return kSwing_rad * std::sin(2 * std::numbers::pi * kFrequency_hz * t_s);
+  };
+  options.more_V[0] = [=](const auto& a_g, double t_s) { return 0.032 * a_g[1] * swing_rad(t_s); };
+  options.more_V[1] = [=](const auto& a_g, double t_s) {
+    return -0.0314 * a_g[0] * swing_rad(t_s);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"t_in_pose", "geometry", "sine, added to delta"});
+  const EffectParameter &size = parameter(found, "amplitude"), &f = parameter(found, "f");
+  EXPECT_NEAR(size.value, kSwing_rad / kRadians, std::max(4 * size.u, 0.03 * size.value));
+  EXPECT_NEAR(f.value, kFrequency_hz, 4 * f.u);
+}
+
+}  // namespace
+}  // namespace plumbline
