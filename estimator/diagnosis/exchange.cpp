@@ -178,7 +178,7 @@ bool exchange_one(SearchModel& model) {
   const std::vector<std::vector<std::size_t>> subsets = exchangeable(model);
   if (subsets.empty()) return false;
   // Pairs grow with the square of the effects, and their fits with their parameters.
-  constexpr std::size_t kMost = 4, kMostInAll = 50, kMostOfMany = 12;
+  constexpr std::size_t kMost = 4, kMostInAll = 50, kMostOfMany = 20;
   const std::size_t most = std::clamp(kMostInAll / subsets.size(), std::size_t{1}, kMost);
   const CandidateResponses& responses = model.responses();
   std::vector<std::vector<SearchModel::Entry>> exchanges(subsets.size());
