@@ -10,17 +10,12 @@
 namespace plumbline {
 namespace {
 
-const Target kOfH{TermForm::geometry, &HeadGeometry::h_rad};
-const Target kOfRoll{TermForm::geometry, &HeadGeometry::roll_rad};
-const Target kTowards{
-    .form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
-
 /// The last parameter is the direction: 0 tilts as h does, 90° as the base roll does.
 class BaseTilt final : public SmoothTerm {
  public:
   explicit BaseTilt(std::unique_ptr<SmoothTerm> term)
       : term_(std::move(term)),
-        function_(term_->shape().substr(0, term_->shape().rfind(kTowards.words()))) {}
+        function_(term_->shape().substr(0, term_->shape().rfind(kTilt.words()))) {}
 
   std::string id() const override { return term_->id(); }
   const std::string& driver() const override { return term_->driver(); }
@@ -78,7 +73,7 @@ class BaseTilt final : public SmoothTerm {
         p.front().size() != term_->parameters().size())
       return found;
     for (const double axis_deg : {0.0, kRoll_deg})
-      if (other->shape() == function_ + (axis_deg == 0 ? kOfH : kOfRoll).words())
+      if (other->shape() == function_ + (axis_deg == 0 ? kH : kRoll).words())
         for (const double beside_deg : {-kBeside_deg, kBeside_deg})
           found.push_back(towards({p.front()}, axis_deg + beside_deg));
     return found;

@@ -35,6 +35,14 @@ struct Target {
   double factor_at(const Visit& visit) const;
 };
 
+/// The angles of head and base; the tilt of the base is for towards_a_direction().
+inline constexpr Target kDelta{.form = TermForm::geometry};
+inline constexpr Target kH{.form = TermForm::geometry, .angle = &HeadGeometry::h_rad};
+inline constexpr Target kRoll{.form = TermForm::geometry, .angle = &HeadGeometry::roll_rad};
+inline constexpr Target kSkew{.form = TermForm::geometry, .angle = &HeadGeometry::skew_rad};
+inline constexpr Target kTilt{
+    .form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
+
 /// Σ c_d·P_d, d = 1 … degree, of the range from low to high. Beyond it degree 1 goes straight on,
 /// degree 2 as a parabola as far as `curved`, in half-ranges, and then straight on; higher degrees
 /// are held.

@@ -218,9 +218,6 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
   for (const auto& memory : memories)
     for (const TermForm form : {TermForm::bias, TermForm::scale})
       terms.push_back(std::make_unique<MemoryTerm>(memory, Target{form}, longest_s));
-  constexpr Target kDelta{.form = TermForm::geometry}, kH{TermForm::geometry, &HeadGeometry::h_rad},
-      kRoll{TermForm::geometry, &HeadGeometry::roll_rad},
-      kTilt{.form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
   for (const auto& memory : memories) {
     if (!memory->is_of_column()) continue;
     const auto of = [&](const Target& target) {

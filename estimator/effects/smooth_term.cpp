@@ -61,11 +61,6 @@ Driver angle_without_return(const VisitLog& log) {
 }
 
 const Target kBias{TermForm::bias}, kScale{TermForm::scale};
-const Target kDelta{TermForm::geometry}, kH{TermForm::geometry, &HeadGeometry::h_rad};
-const Target kRoll{TermForm::geometry, &HeadGeometry::roll_rad};
-const Target kSkew{TermForm::geometry, &HeadGeometry::skew_rad};
-const Target kTilt{
-    .form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
 
 /// An angle that follows the load as it turns with the tilt.
 std::array<Target, 2> pulled(const Target& angle) {
