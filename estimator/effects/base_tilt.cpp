@@ -1,6 +1,7 @@
 #include "estimator/effects/base_tilt.h"
 
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,6 +44,10 @@ class BaseTilt final : public SmoothTerm {
       for (const double direction_deg : {-45.0, 45.0})
         starts.push_back(towards(of_term, direction_deg));
     return starts;
+  }
+  std::optional<std::size_t> sets_in_at(const VisitLog& log,
+                                        const std::vector<double>& p) const override {
+    return term_->sets_in_at(log, p);
   }
   double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {

@@ -309,10 +309,6 @@ std::optional<DwellLine> line_of(const Dwells& dwells, const Peak& peak, double 
       dwells.slow_is_left || (is_steady(dwells, peak) && !begins_on_arrival(dwells, peak))};
 }
 
-}  // namespace
-
-namespace {
-
 /// The strongest line in the courses of dwells.
 std::optional<DwellLine> line_in_courses(const Dwells& dwells) {
   constexpr std::size_t kStrongest = 3;
