@@ -19,9 +19,9 @@ struct OutlyingReading {
 /// The readings of an axis that stand out of their dwells: off the median by more than 8 standard
 /// deviations of single readings (from the median deviation of all dwells or of this one, the
 /// larger) and by more than 4 steps of the converter, their neighbours not. Nothing where it is the
-/// converter (codes that prove a fault, jumps at one voltage), where it comes again and again so long
-/// after arrival or before the head leaves, or where more than 2 % stand out: that is noise of another kind. Dwells of
-/// fewer than 8 readings are left as they are.
+/// converter (codes that prove a fault, jumps at one voltage), where it comes again and again so
+/// long after arrival or before the head leaves, or where more than 2 % stand out: that is noise of
+/// another kind. Dwells of fewer than 8 readings are left as they are.
 std::vector<OutlyingReading> outlying_readings(const MeasurementSet& set, std::size_t axis,
                                                const std::optional<Adc>& adc);
 
