@@ -150,14 +150,17 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
 /// What one candidate may take the place of: one effect, two, all that one axis has, or all that
 /// the head has.
 std::vector<std::vector<std::size_t>> exchangeable(const SearchModel& model) {
-  std::vector<std::vector<std::size_t>> subsets;
-  for (std::size_t k = 0; k < model.size(); ++k) subsets.push_back({k});
+  std::vector<std::size_t> open;
   for (std::size_t k = 0; k < model.size(); ++k)
-    for (std::size_t l = k + 1; l < model.size(); ++l) subsets.push_back({k, l});
+    if (!model.is_certain(model.candidate(k))) open.push_back(k);
+  std::vector<std::vector<std::size_t>> subsets;
+  for (const std::size_t k : open) subsets.push_back({k});
+  for (auto k = open.begin(); k != open.end(); ++k)
+    for (auto l = k + 1; l != open.end(); ++l) subsets.push_back({*k, *l});
   const auto add_all = [&](const auto& belongs) {
     std::vector<std::size_t> all;
-    for (std::size_t k = 0; k < model.size(); ++k)
-      if (belongs(model.candidate(k)) && !model.is_certain(model.candidate(k))) all.push_back(k);
+    for (const std::size_t k : open)
+      if (belongs(model.candidate(k))) all.push_back(k);
     if (all.size() > 2) subsets.push_back(std::move(all));
   };
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
@@ -165,10 +168,6 @@ std::vector<std::vector<std::size_t>> exchangeable(const SearchModel& model) {
       return candidate.axis == axis && candidate.effect->subject() == Subject::sensor;
     });
   add_all([](const Candidate& candidate) { return candidate.effect->subject() == Subject::head; });
-  std::erase_if(subsets, [&](const std::vector<std::size_t>& subset) {
-    return std::any_of(subset.begin(), subset.end(),
-                       [&](std::size_t k) { return model.is_certain(model.candidate(k)); });
-  });
   return subsets;
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <unsupported/Eigen/FFT>
+#include <utility>
 
 #include "estimator/effects/effect.h"
 
@@ -350,19 +351,20 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
 
 std::optional<DwellLine> line_of_angle(const MeasurementSet& set,
                                        const PerAxis<Eigen::VectorXd>& by_angle) {
-  Dwells dwells = courses_of(set, 0);
-  if (!dwells.say_enough()) return {};
-  dwells.off_V.setZero();
+  std::optional<Dwells> sum;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    const Dwells of_axis = courses_of(set, axis);
+    Dwells of_axis = courses_of(set, axis);
+    if (!of_axis.say_enough()) return {};
     Eigen::Index k = 0;
-    for (std::size_t pose = 0; pose < set.poses.size(); ++pose) {
-      if (set.poses[pose].count < kFewestSamples) continue;
-      dwells.off_V.col(k) += by_angle[axis](static_cast<Eigen::Index>(pose)) * of_axis.off_V.col(k);
-      ++k;
-    }
+    for (std::size_t pose = 0; pose < set.poses.size(); ++pose)
+      if (set.poses[pose].count >= kFewestSamples)
+        of_axis.off_V.col(k++) *= by_angle[axis](static_cast<Eigen::Index>(pose));
+    if (sum)
+      sum->off_V += of_axis.off_V;
+    else
+      sum = std::move(of_axis);
   }
-  return line_in_courses(dwells);
+  return line_in_courses(*sum);
 }
 
 std::optional<DwellLine> line_between_dwells(const MeasurementSet& set,

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <utility>
+
 #include "estimator/calibrate.h"
 #include "tests/estimator/synthetic_run.h"
 
@@ -16,9 +19,8 @@ struct Structure {
 };
 
 /// The only finding there is, which it expects to be this one and to leave next to noise.
-inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
+inline UnlistedStructure expect_only_structure(const SyntheticRun& data,
                                                const Structure& expected) {
-  const SyntheticRun data = synthetic_run(7, kSixteenBits, options);
   const Calibration result = calibrated(data);
   SCOPED_TRACE(result.diagnosis.reason);
   EXPECT_THAT(result.diagnosis.effects, testing::IsEmpty());
@@ -33,6 +35,21 @@ inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
     EXPECT_LT(result.after.heldout_pose_rms_mps2[i], 1.3 * result.floor_pose_rms_mps2[i]);
   }
   return found;
+}
+inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
+                                               const Structure& expected) {
+  return expect_only_structure(synthetic_run(7, kSixteenBits, options), expected);
+}
+
+/// What a run of these options would be with a column that was recorded beside it, a function of
+/// the time in s.
+inline SyntheticRun with_column(const SyntheticOptions& options, const char* name,
+                                const std::function<double(double)>& course) {
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  Covariate column{name, {}};
+  for (const double t_s : data.run.samples.t_s) column.value.push_back(course(t_s));
+  data.run.samples.covariates = {std::move(column)};
+  return data;
 }
 
 }  // namespace plumbline

@@ -10,9 +10,6 @@
 namespace plumbline {
 namespace {
 
-using testing::IsEmpty;
-using testing::SizeIs;
-
 SyntheticOptions long_dwells() {
   SyntheticOptions options;
   options.delta_step_deg = 10;
@@ -59,17 +56,8 @@ TEST(Structure, AMachineThatRunsNowAndThenIsALineOfItsColumn) {
   options.more_V[1] = [=](const auto&, double t_s) {
     return 2e-4 * runs(t_s) * std::sin(2 * std::numbers::pi * 21.7 * t_s);
   };
-  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  Covariate compressor{"compressor_on", {}};
-  for (const double t_s : data.run.samples.t_s) compressor.value.push_back(runs(t_s));
-  data.run.samples.covariates = {compressor};
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  EXPECT_EQ(result.diagnosis.unlisted[0].driver, "compressor_on");
-  EXPECT_EQ(result.diagnosis.unlisted[0].form, "sample");
-  EXPECT_EQ(result.diagnosis.unlisted[0].shape, "straight line, times a sine");
+  expect_only_structure(with_column(options, "compressor_on", runs),
+                        {"compressor_on", "sample", "straight line, times a sine"});
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 namespace plumbline {
 namespace {
 
-using testing::IsEmpty;
 using testing::SizeIs;
 
 constexpr double kRadians = std::numbers::pi / 180;
@@ -57,13 +56,8 @@ TEST(Structure, ATiltAlmostAlongAnAxisOfTheBaseIsOne) {
   options.base_roll_rad = [=](double t_s) { return 0.004 * course(t_s); };
   SyntheticRun data = synthetic_run(7, kSixteenBits, options);
   for (const double t_s : data.run.samples.t_s) data.run.samples.temp_C.push_back(21 + course(t_s));
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  const UnlistedStructure& found = result.diagnosis.unlisted.front();
-  EXPECT_EQ(found.driver, "temp_C");
-  EXPECT_EQ(found.shape, "polynomial of degree 1, added to the tilt of the base");
+  const UnlistedStructure found = expect_only_structure(
+      data, {"temp_C", "geometry", "polynomial of degree 1, added to the tilt of the base"});
   const EffectParameter& direction = parameter(found, "direction");
   EXPECT_NEAR(direction.value, std::atan2(0.004, 0.02) / kRadians, 4 * direction.u);
 }
@@ -85,18 +79,9 @@ TEST(Structure, AnArmThatWarmsLateTiltsWithTheAverageOfThePast) {
       late_K += kStep_s / kTau_s * (coolant_K(last_s) - late_K);
     return 0.02 * late_K;
   };
-  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  Covariate coolant{"coolant_C", {}};
-  for (const double t_s : data.run.samples.t_s) coolant.value.push_back(25 + coolant_K(t_s));
-  data.run.samples.covariates = {coolant};
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  const UnlistedStructure& found = result.diagnosis.unlisted.front();
-  EXPECT_EQ(found.driver, "coolant_C");
-  EXPECT_EQ(found.form, "geometry");
-  EXPECT_EQ(found.shape, "straight line in the average of the past, added to h");
+  const UnlistedStructure found = expect_only_structure(
+      with_column(options, "coolant_C", [&](double t_s) { return 25 + coolant_K(t_s); }),
+      {"coolant_C", "geometry", "straight line in the average of the past, added to h"});
   const EffectParameter& tau = parameter(found, "tau");
   EXPECT_NEAR(tau.value, kTau_s, 4 * tau.u);
 }

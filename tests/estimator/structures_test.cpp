@@ -276,14 +276,9 @@ TEST(Structure, WhatATemperatureDrawsThroughAPlayIsOneFunctionOfIt) {
   SyntheticRun data = synthetic_run(7, kSixteenBits, options);
   for (const double t_s : data.run.samples.t_s)
     data.run.samples.temp_C.push_back(temperature_C(t_s));
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  const UnlistedStructure& found = result.diagnosis.unlisted.front();
-  EXPECT_EQ(found.driver, "temp_C");
-  EXPECT_EQ(found.form, "bias");
-  EXPECT_EQ(found.shape, "drawn through a play");
+  const UnlistedStructure found =
+      expect_only_structure(data, {"temp_C", "bias", "drawn through a play"});
+  ASSERT_FALSE(found.parameters.empty());
   EXPECT_NEAR(found.parameters[0].value, 2, 3 * found.parameters[0].u);
 }
 
@@ -364,18 +359,8 @@ TEST(Structure, WhatLeaksBeyondSomeHumidityIsAPowerOfTheRest) {
   options.more_V[2] = [=](const auto&, double t_s) {
     return 2e-4 * std::pow(std::max(0.0, humidity(t_s) - 49), 1.5);
   };
-  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
-  Covariate column{"rh_pct", {}};
-  for (const double t_s : data.run.samples.t_s) column.value.push_back(humidity(t_s));
-  data.run.samples.covariates = {column};
-  const Calibration result = calibrated(data);
-  SCOPED_TRACE(result.diagnosis.reason);
-  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1));
-  const UnlistedStructure& found = result.diagnosis.unlisted.front();
-  EXPECT_EQ(found.driver, "rh_pct");
-  EXPECT_EQ(found.form, "bias");
-  EXPECT_EQ(found.shape, "power beyond a value");
+  expect_only_structure(with_column(options, "rh_pct", humidity),
+                        {"rh_pct", "bias", "power beyond a value"});
 }
 
 }  // namespace
