@@ -154,6 +154,7 @@ std::vector<std::vector<std::size_t>> exchangeable(const SearchModel& model) {
   for (std::size_t k = 0; k < model.size(); ++k)
     if (!model.is_certain(model.candidate(k))) open.push_back(k);
   std::vector<std::vector<std::size_t>> subsets;
+  subsets.reserve(open.size());
   for (const std::size_t k : open) subsets.push_back({k});
   for (auto k = open.begin(); k != open.end(); ++k)
     for (auto l = k + 1; l != open.end(); ++l) subsets.push_back({*k, *l});
