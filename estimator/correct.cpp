@@ -5,8 +5,8 @@
 #include <cassert>
 #include <cmath>
 #include <memory>
-#include <numbers>
 
+#include "estimator/angle_units.h"
 #include "estimator/diagnosis/restored_model.h"
 
 namespace plumbline {
@@ -32,7 +32,6 @@ bool can_be_computed(const Effect& effect) {
 /// Every reading as a visit of its own, at the angles under which a head would show its specific
 /// force, so that effects can be evaluated.
 MeasurementSet as_visits(const SampleTable& readings, const std::vector<Eigen::Vector3d>& a_g) {
-  constexpr double kDegPerRad = 180 / std::numbers::pi;
   MeasurementSet set;
   set.samples = readings;
   for (std::size_t k = 0; k < readings.size(); ++k) {

@@ -35,6 +35,15 @@ double rms(const Eigen::VectorXd& values) {
   return count > 0 ? std::sqrt(sum / count) : kNan;
 }
 
+WorstError worst_of(const PerAxis<LeftOutErrors>& errors) {
+  WorstError worst;
+  for (const LeftOutErrors& of_axis : errors)
+    for (Eigen::Index k = 0; k < of_axis.error_mps2.size(); ++k)
+      if (std::abs(of_axis.error_mps2(k)) > worst.error_mps2)
+        worst = {std::abs(of_axis.error_mps2(k)), of_axis.u_mps2(k)};
+  return worst;
+}
+
 double max_abs(const Eigen::VectorXd& values) {
   double largest = kNan;
   for (const double value : values)

@@ -19,6 +19,20 @@ double rms(const Eigen::VectorXd& values);
 /// Largest magnitude of the finite entries; NaN when there is none.
 double max_abs(const Eigen::VectorXd& values);
 
+/// Errors of an axis on poses that were left out of the fit, in blocks of time, then of position:
+/// 2n each, NaN where nothing is known.
+struct LeftOutErrors {
+  Eigen::VectorXd error_mps2;
+  Eigen::VectorXd u_mps2;  ///< standard uncertainty, by the noise and by the fit to the others
+};
+
+/// The largest of all, which conformity is decided by.
+struct WorstError {
+  double error_mps2 = -1;  ///< magnitude; negative: there is none
+  double u_mps2 = 0;
+};
+WorstError worst_of(const PerAxis<LeftOutErrors>& errors);
+
 /// Poses (row numbers, ascending) that are left out together; each partition covers every pose
 /// once.
 using Blocks = std::vector<std::vector<Eigen::Index>>;

@@ -3,15 +3,14 @@
 #include <Eigen/QR>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "estimator/angle_units.h"
 #include "estimator/kinematics.h"
 
 namespace plumbline::app {
 namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
-constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
 
 /// Root of the summed squares of the change of one parameter by 1″ at every pose, for δ and for h.
 struct AngleSensitivity {

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string_view>
 #include <utility>
 
 #include "app/certificate/rounding.h"
+#include "estimator/angle_units.h"
 #include "estimator/effects/covariate.h"
 
 namespace plumbline::app {
@@ -154,7 +154,7 @@ std::string parameter_text(const EffectParameter& parameter) {
   // Angles of the head are stated in degrees throughout.
   const bool in_rad = parameter.unit == "rad";
   const std::string unit = in_rad ? "°" : printed_unit(parameter.unit);
-  const double factor = in_rad ? 180 / std::numbers::pi : 1;
+  const double factor = in_rad ? kDegPerRad : 1;
   const double value = factor * parameter.value;
   text += " = ";
   if (parameter.u > 0) {

@@ -10,10 +10,10 @@
 #include <cmath>
 #include <deque>
 #include <mutex>
-#include <numbers>
 #include <string>
 #include <utility>
 
+#include "estimator/angle_units.h"
 #include "rig/strict_toml.h"
 
 namespace plumbline::app {
@@ -24,7 +24,6 @@ constexpr std::array kActsOn = {"bias", "scale", "delta", "h", "roll", "skew"};
 enum class Target { bias, scale, delta, h, roll, skew };
 const std::vector<std::string> kKinds = {"amplitude", "shape", "index"};
 constexpr const char* kPrefix = "user.";
-constexpr double kDegrees = 180 / std::numbers::pi;
 
 /// What an expression may use, in the order of its values.
 enum Variable {
@@ -201,7 +200,7 @@ class OwnEffect final : public Effect {
     }
   }
   double angle_rad(const VisitLog& log, std::size_t visit, const double* p, double since_s) const {
-    return value(log, visit, nullptr, nullptr, p, since_s) / kDegrees;
+    return value(log, visit, nullptr, nullptr, p, since_s) / kDegPerRad;
   }
   /// From so many of its samples; one in the middle where nothing changes in between.
   template <class ValueAt>
@@ -244,14 +243,14 @@ class OwnEffect final : public Effect {
       return specific_force_g({log.visits[k].delta_rad, log.visits[k].h_rad}, log.gamma);
     };
     const Eigen::Vector3d a = force(visit), prev_a = force(before);
-    v[kDelta] = at.delta_rad * kDegrees;
-    v[kH] = at.h_rad * kDegrees;
+    v[kDelta] = at.delta_rad * kDegPerRad;
+    v[kH] = at.h_rad * kDegPerRad;
     v[kTime] = at.t_arrival_s + since_arrival_s;
     v[kTimeInPose] = since_arrival_s;
     v[kTemperature] = reference_C_ + at.temperature_K;
     v[kPose] = static_cast<double>(visit) - static_cast<double>(log.earlier);
-    v[kPrevDelta] = from.delta_rad * kDegrees;
-    v[kPrevH] = from.h_rad * kDegrees;
+    v[kPrevDelta] = from.delta_rad * kDegPerRad;
+    v[kPrevH] = from.h_rad * kDegPerRad;
     for (Eigen::Index i = 0; i < 3; ++i) {
       v[static_cast<std::size_t>(kAx + i)] = a(i);
       v[static_cast<std::size_t>(kPrevAx + i)] = prev_a(i);

@@ -1,6 +1,6 @@
 #include "app/io/diagnosis_json.h"
 
-#include <numbers>
+#include "estimator/angle_units.h"
 
 namespace plumbline::app {
 
@@ -59,7 +59,6 @@ Json to_json(const DetectionLimit& limit) {
 }
 
 Json to_json(const RunHistory& history) {
-  constexpr double kDegPerRad = 180 / std::numbers::pi;
   const auto column = [&](const auto& value) {
     std::vector<double> values;
     for (const Visit& visit : history.visits) values.push_back(value(visit));

@@ -1,11 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <numbers>
 
 #include "app/config/own_effects.h"
 #include "app/io/read_file.h"
 #include "app/io/result_json.h"
+#include "estimator/angle_units.h"
 
 namespace plumbline::app {
 
@@ -85,7 +85,6 @@ UnlistedStructure unlisted_structure(const Json& json) {
 }
 
 RunHistory run_history(const Json& json) {
-  constexpr double kRadPerDeg = std::numbers::pi / 180;
   RunHistory history;
   history.has_temperature = json.contains("above_reference_K");
   for (const auto& [name, values] : json.at("covariates").items())

@@ -1,15 +1,13 @@
 #include "app/io/scalar_json.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "app/io/diagnosis_json.h"
+#include "estimator/angle_units.h"
 
 namespace plumbline::app {
 
 namespace {
-
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 Json json_vector(const Eigen::Vector3d& v) { return json_numbers({v(0), v(1), v(2)}); }
 

@@ -1,8 +1,8 @@
 #include "app/station/running_fit.h"
 
 #include <cmath>
-#include <numbers>
 
+#include "estimator/angle_units.h"
 #include "estimator/fit/least_squares.h"
 #include "estimator/kinematics.h"
 
@@ -11,7 +11,6 @@ namespace plumbline::app {
 namespace {
 
 constexpr Eigen::Index kParameters = 4;
-constexpr double kRad = std::numbers::pi / 180;
 
 }  // namespace
 
@@ -21,7 +20,7 @@ std::optional<PerAxis<RunningAxis>> running_fit(const std::vector<PoseMean>& pos
   Eigen::MatrixXd A(n, kParameters);
   for (Eigen::Index i = 0; i < n; ++i) {
     const rig::HeadAngles& at = poses[static_cast<std::size_t>(i)].target;
-    const HeadGeometry head{.delta_rad = at.delta_deg * kRad, .h_rad = at.h_deg * kRad};
+    const HeadGeometry head{.delta_rad = at.delta_deg * kRadPerDeg, .h_rad = at.h_deg * kRadPerDeg};
     A.row(i) << specific_force_g(head, gamma).transpose(), 1.0;
   }
   PerAxis<RunningAxis> fit;

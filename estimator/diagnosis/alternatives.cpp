@@ -66,11 +66,9 @@ Eigen::VectorXd shift_to(const EnlargedParameters& rival, const EnlargedParamete
     shift.segment<4>(4 * static_cast<Eigen::Index>(axis)) = rival.twelve[axis] - found.twelve[axis];
   for (std::size_t e = 0; e < found.effects.size(); ++e) {
     if (e == index) continue;
-    const ActiveEffect& here = found.effects[e];
     const ActiveEffect& there = rival.effects[e < index ? e : e - 1];
-    Eigen::Index row = found.first_free(e);
-    for (std::size_t k = 0; k < here.p.size(); ++k)
-      if (here.free[k]) shift(row++) = there.p[k] - here.p[k];
+    for (const EstimatedParameter& here : estimated_of(found, e))
+      shift(here.row) = there.p[here.place] - here.value;
   }
   return shift;
 }

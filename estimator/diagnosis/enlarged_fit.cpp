@@ -15,8 +15,8 @@ namespace plumbline {
 
 namespace {
 
-bool has_a_sign_to_keep(const ActiveEffect& active, const ParameterInfo& info, std::size_t k) {
-  return active.free[k] && info.role == ParameterRole::shape && !info.place;
+bool has_a_sign_to_keep(const ParameterInfo& info) {
+  return info.role == ParameterRole::shape && !info.place;
 }
 
 constexpr double kLargestChange = 3, kLikelyChange = 2;  // of a sensitivity, as ratios
@@ -50,13 +50,10 @@ bool remembers(const EnlargedParameters& parameters, std::size_t axis) {
 bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& start) {
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     if (!is_about_the_size(trial, start, axis, kLargestChange)) return false;
-  for (std::size_t e = 0; e < trial.effects.size(); ++e) {
-    const ActiveEffect& active = trial.effects[e];
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (has_a_sign_to_keep(active, infos[k], k) && !(active.p[k] * start.effects[e].p[k] > 0))
+  for (std::size_t e = 0; e < trial.effects.size(); ++e)
+    for (const EstimatedParameter& size : estimated_of(trial, e))
+      if (has_a_sign_to_keep(size.info) && !(size.value * start.effects[e].p[size.place] > 0))
         return false;
-  }
   return true;
 }
 
@@ -65,12 +62,10 @@ bool makes_sense(const EnlargedParameters& trial, const EnlargedParameters& star
 void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& trial) {
   constexpr double kLeastLeft = 0.1;
   for (std::size_t e = 0; e < trial.effects.size(); ++e) {
-    ActiveEffect& active = trial.effects[e];
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      const double least = kLeastLeft * from.effects[e].p[k];
-      if (has_a_sign_to_keep(active, infos[k], k) && !(active.p[k] / least > 1))
-        active.p[k] = least;
+    for (const EstimatedParameter& size : estimated_of(trial, e)) {
+      const double least = kLeastLeft * from.effects[e].p[size.place];
+      if (has_a_sign_to_keep(size.info) && !(size.value / least > 1))
+        trial.effects[e].p[size.place] = least;
     }
   }
 }
@@ -78,16 +73,9 @@ void stop_short_of_zero(const EnlargedParameters& from, EnlargedParameters& tria
 /// Of the Jacobian, those that belong to shapes.
 std::vector<Eigen::Index> columns_of_shapes(const EnlargedParameters& parameters) {
   std::vector<Eigen::Index> columns;
-  for (std::size_t e = 0; e < parameters.effects.size(); ++e) {
-    const ActiveEffect& active = parameters.effects[e];
-    const auto infos = active.effect->parameters();
-    Eigen::Index column = parameters.first_free(e);
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (!active.free[k]) continue;
-      if (infos[k].role == ParameterRole::shape) columns.push_back(column);
-      ++column;
-    }
-  }
+  for (std::size_t e = 0; e < parameters.effects.size(); ++e)
+    for (const EstimatedParameter& parameter : estimated_of(parameters, e))
+      if (parameter.info.role == ParameterRole::shape) columns.push_back(parameter.row);
   return columns;
 }
 
@@ -135,14 +123,7 @@ bool cancel_each_other(const EnlargedFit& fit) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(jacobian.rows());
   double largest = 0;
   for (std::size_t e = 0; e < effects.size(); ++e) {
-    const auto infos = effects[e].effect->parameters();
-    Eigen::VectorXd own = Eigen::VectorXd::Zero(jacobian.rows());
-    Eigen::Index column = fit.parameters.first_free(e);
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (!effects[e].free[k]) continue;
-      if (infos[k].role == ParameterRole::amplitude) own += effects[e].p[k] * jacobian.col(column);
-      ++column;
-    }
+    Eigen::VectorXd own = whitened_contribution(fit, e);
     own -= twelve * (twelve.transpose() * own);
     largest = std::max(largest, own.norm());
     sum += own;
@@ -170,19 +151,20 @@ bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, 
 }
 
 bool leaves_a_size_open(const EnlargedFit& fit, double most) {
-  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e) {
-    const ActiveEffect& active = fit.parameters.effects[e];
-    const auto infos = active.effect->parameters();
-    Eigen::Index row = fit.parameters.first_free(e);
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (!active.free[k]) continue;
-      const double u = std::sqrt(fit.covariance(row, row));
-      ++row;
-      if (has_a_sign_to_keep(active, infos[k], k) && !(u < most * std::abs(active.p[k])))
+  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e)
+    for (const EstimatedParameter& size : estimated_of(fit.parameters, e))
+      if (has_a_sign_to_keep(size.info) &&
+          !(std::sqrt(fit.covariance(size.row, size.row)) < most * std::abs(size.value)))
         return true;
-    }
-  }
   return false;
+}
+
+Eigen::VectorXd whitened_contribution(const EnlargedFit& fit, std::size_t effect) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(fit.whitened_jacobian.rows());
+  for (const EstimatedParameter& parameter : estimated_of(fit.parameters, effect))
+    if (parameter.info.role == ParameterRole::amplitude)
+      sum += parameter.value * fit.whitened_jacobian.col(parameter.row);
+  return sum;
 }
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {

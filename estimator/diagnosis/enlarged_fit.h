@@ -51,6 +51,10 @@ bool knows_sensitivity(const EnlargedFit& fit, const EnlargedParameters& start, 
 /// standard uncertainty is `most` times what it is, or more.
 bool leaves_a_size_open(const EnlargedFit& fit, double most);
 
+/// What the amplitudes of one effect add to the whitened readings, to first order; as long as the
+/// rows of the fit's Jacobian.
+Eigen::VectorXd whitened_contribution(const EnlargedFit& fit, std::size_t effect);
+
 /// How far a fit is taken.
 struct FitLimits {
   int most_iterations = 20;  ///< as many as it takes to settle

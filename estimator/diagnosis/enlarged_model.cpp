@@ -268,11 +268,10 @@ std::vector<FreeParameter> free_parameters(const EnlargedParameters& parameters)
   for (std::size_t i = 0; i < 4 * kAxisCount; ++i) all.push_back({{}, i / 4, 1e-6});
   for (std::size_t e = 0; e < parameters.effects.size(); ++e) {
     const ActiveEffect& active = parameters.effects[e];
-    const auto infos = active.effect->parameters();
     std::optional<std::size_t> axis;
     if (active.effect->subject() == Subject::sensor) axis = active.axis;
-    for (std::size_t k = 0; k < active.p.size(); ++k)
-      if (active.free[k]) all.push_back({e, axis, difference_step(infos[k], active.p[k])});
+    for (const EstimatedParameter& parameter : estimated_of(parameters, e))
+      all.push_back({e, axis, difference_step(parameter.info, parameter.value)});
   }
   return all;
 }
@@ -448,14 +447,12 @@ void set_linear_columns(const Forces& a_g, const std::vector<HeadAtVisit>& head,
 }  // namespace
 
 bool shapes_differ(const EnlargedParameters& one, const EnlargedParameters& other) {
-  for (std::size_t e = 0; e < one.effects.size(); ++e) {
-    const ActiveEffect& active = one.effects[e];
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k)
-      if (active.free[k] && infos[k].role == ParameterRole::shape &&
-          std::abs(active.p[k] - other.effects[e].p[k]) > difference_step(infos[k], active.p[k]))
+  for (std::size_t e = 0; e < one.effects.size(); ++e)
+    for (const EstimatedParameter& shape : estimated_of(one, e))
+      if (shape.info.role == ParameterRole::shape &&
+          std::abs(shape.value - other.effects[e].p[shape.place]) >
+              difference_step(shape.info, shape.value))
         return true;
-  }
   return false;
 }
 

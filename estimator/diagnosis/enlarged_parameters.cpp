@@ -79,6 +79,16 @@ double EnlargedParameters::mps2_per_V(std::size_t axis) const {
   return kStandardGravity_mps2 / twelve[axis](static_cast<Eigen::Index>(axis));
 }
 
+std::vector<EstimatedParameter> estimated_of(const EnlargedParameters& model, std::size_t effect) {
+  const ActiveEffect& active = model.effects[effect];
+  std::vector<ParameterInfo> infos = active.effect->parameters();
+  std::vector<EstimatedParameter> estimated;
+  Eigen::Index row = model.first_free(effect);
+  for (std::size_t k = 0; k < infos.size(); ++k)
+    if (active.free[k]) estimated.push_back({std::move(infos[k]), active.p[k], k, row++});
+  return estimated;
+}
+
 bool is_of_sensor(const ActiveEffect& active, std::size_t axis) {
   return active.effect->subject() == Subject::sensor && active.axis == axis;
 }

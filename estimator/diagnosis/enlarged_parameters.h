@@ -42,6 +42,17 @@ struct EnlargedParameters {
   double mps2_per_V(std::size_t axis) const;
 };
 
+/// A parameter of an effect that is estimated.
+struct EstimatedParameter {
+  ParameterInfo info;
+  double value = 0;
+  std::size_t place = 0;  ///< among the parameters of its effect
+  Eigen::Index row = 0;   ///< among all free ones of the model, as in a covariance
+};
+
+/// Those of one of the effects, in their order.
+std::vector<EstimatedParameter> estimated_of(const EnlargedParameters& model, std::size_t effect);
+
 /// Whether it is an effect of the sensor of that axis.
 bool is_of_sensor(const ActiveEffect& active, std::size_t axis);
 

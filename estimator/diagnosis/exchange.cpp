@@ -65,16 +65,7 @@ bool take_back_each_other(const SearchModel& model, std::size_t first, std::size
   constexpr Eigen::Index kTwelve = 4 * kAxisCount;
   const Eigen::MatrixXd basis = orthonormal_basis(fit.whitened_jacobian.leftCols(kTwelve));
   const auto contribution = [&](std::size_t effect) {
-    Eigen::Index column = fit.parameters.first_free(effect);
-    const ActiveEffect& active = fit.parameters.effects[effect];
-    const auto infos = active.effect->parameters();
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(fit.whitened_jacobian.rows());
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (!active.free[k]) continue;
-      if (infos[k].role == ParameterRole::amplitude)
-        sum += active.p[k] * fit.whitened_jacobian.col(column);
-      ++column;
-    }
+    const Eigen::VectorXd sum = whitened_contribution(fit, effect);
     return Eigen::VectorXd(sum - basis * (basis.transpose() * sum));
   };
   const Eigen::VectorXd one = contribution(first), other = contribution(second);

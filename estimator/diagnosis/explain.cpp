@@ -180,6 +180,81 @@ bool is_far_beyond(double rms_mps2, const AxisVerdictInput& noise) {
          rms_mps2 - noise.expected_mps2 > kStandardUncertainties * noise.u_expected_mps2;
 }
 
+/// The twelve as the propagation sees them, but for their covariance. Rounding that was estimated
+/// from the codes is part of the noise.
+PropagatedEstimate certified_estimate(const ExplainInput& input, const ValidatedSearch& searched,
+                                      const VisitLog& estimated_log) {
+  if (searched.codes)
+    return propagated(estimated_log, searched.codes->before_converter.fit,
+                      searched.codes->before_converter.whitening);
+  const SearchResult& found = searched.found;
+  PropagatedEstimate estimate = propagated(input.log, found.fit, found.whitening);
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    estimate.rounding_V2[i] = found.own_V2[i] - input.known_V2[i];
+  return estimate;
+}
+
+/// Gives the covariance of what was found its allowances for noise and choices.
+void allow_for_choices(const SearchInput& estimated_search, const SearchInput& search,
+                       std::optional<CodeEstimate>& codes, SearchResult& found) {
+  const EnlargedParameters& model = found.fit.parameters;
+  if (!codes) {
+    found.fit.covariance = with_allowances(search, found, prediction_jacobian(search.log, model),
+                                           choice_deviations_V(search.log, model));
+    return;
+  }
+  SearchResult& before = codes->before_converter;
+  before.fit.covariance = with_allowances(
+      estimated_search, before, prediction_jacobian(estimated_search.log, before.fit.parameters),
+      codes->deviation_V);
+  static_cast<EnlargedEstimate&>(found.fit) = codes->with_converter(before.fit, found);
+}
+
+/// Errors on left-out poses against the means that are stated.
+PerAxis<LeftOutErrors> stated_errors(const ValidatedSearch& searched,
+                                     const PerAxis<Eigen::VectorXd>& stated_V) {
+  const SearchResult& found = searched.found;
+  PerAxis<LeftOutErrors> errors = searched.left_out;
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const double factor = found.fit.parameters.mps2_per_V(i);
+    errors[i].error_mps2 += factor * (stated_V[i] - found.observed.mean_V[i]).replicate<2, 1>();
+    if (found.beyond_V2[i])
+      errors[i].u_mps2 =
+          (errors[i].u_mps2.array().square() + factor * factor * *found.beyond_V2[i]).sqrt();
+  }
+  return errors;
+}
+
+/// What the noise leaves of an axis's pose means beside the effects, not the noise that had to take
+/// them up before. covariance: of the fit by the means.
+Eigen::MatrixXd left_by_noise_V2(const SearchResult& found, const Eigen::MatrixXd& jacobian,
+                                 const Eigen::MatrixXd& covariance, std::size_t axis) {
+  const auto n = found.noise[axis].covariance.rows();
+  const auto block = jacobian.middleRows(static_cast<Eigen::Index>(axis) * n, n);
+  return found.noise[axis].covariance - block * covariance * block.transpose();
+}
+
+PerAxis<bool> axes_concerned(const EnlargedParameters& model) {
+  PerAxis<bool> concerned{};
+  for (const ActiveEffect& active : model.effects)
+    for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
+  return concerned;
+}
+
+/// Whether more is left than the noise re-estimated beside the effects leaves: all in all, and of
+/// each axis, since what is slow is many times the noise before it is much of χ².
+bool more_is_left(const ExplainInput& input, const EnlargedFit& fit,
+                  const PerAxis<std::optional<AxisVerdictInput>>& residual,
+                  const PerAxis<double>& after_mps2) {
+  const double chi2 = fit.whitened_residual.head(mean_rows(input.log)).squaredNorm();
+  const double dof =
+      3 * static_cast<double>(input.poses.size()) - static_cast<double>(fit.covariance.rows());
+  if (chi_squared_tail(chi2, dof) < 1e-4) return true;
+  for (std::size_t i = 0; i < kAxisCount; ++i)
+    if (residual[i] && is_far_beyond(after_mps2[i], *residual[i])) return true;
+  return false;
+}
+
 }  // namespace
 
 std::optional<Explained> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -204,13 +279,12 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     add_noise(input.noise_follows, model, diagnosis);
     add_noise(wanders_beyond_record(search, found), model, diagnosis);
   };
-  const auto without_effects = [&]() -> std::optional<Explained> {
-    result.schwarz_criterion = schwarz_criterion(log, found);
+  result.schwarz_criterion = schwarz_criterion(log, found);
+  if (found.evidence.empty()) {
     result.diagnosis.not_found = detection_limits(search, searched.candidates, found);
     add_noise_to(result.diagnosis, {});
     return std::nullopt;
-  };
-  if (found.evidence.empty()) return without_effects();
+  }
 
   // What is estimated from other readings has a log of its own.
   const VisitLog& estimated_log = searched.log ? *searched.log : log;
@@ -219,31 +293,15 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   std::optional<CodeEstimate>& codes = searched.codes;
   if (!codes) codes = estimate_from_codes(search, input.input.run, found);
 
-  // Leaving out and the expected residual want the covariance under the noise that was used.
-  const PerAxis<Eigen::VectorXd> stated_V = stated_means_V(search, found);
-  PerAxis<Eigen::VectorXd>& heldout_errors_mps2 = searched.heldout_mps2;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    heldout_errors_mps2[i] += found.fit.parameters.mps2_per_V(i) *
-                              (stated_V[i] - found.observed.mean_V[i]).replicate<2, 1>();
   const EnlargedEstimate by_means = found.fit;
-  Explained explained;
-  explained.estimate = codes ? propagated(estimated_log, codes->before_converter.fit,
-                                          codes->before_converter.whitening)
-                             : propagated(log, found.fit, found.whitening);
-  // Rounding that was estimated from the codes is part of the noise.
-  for (std::size_t i = 0; i < kAxisCount && !codes; ++i)
-    explained.estimate.rounding_V2[i] = found.own_V2[i] - input.known_V2[i];
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);
-  if (codes) {
-    SearchResult& before = codes->before_converter;
-    before.fit.covariance = with_allowances(
-        estimated_search, before, prediction_jacobian(estimated_log, before.fit.parameters),
-        codes->deviation_V);
-    static_cast<EnlargedEstimate&>(found.fit) = codes->with_converter(before.fit, found);
-  } else {
-    found.fit.covariance =
-        with_allowances(search, found, jacobian, choice_deviations_V(log, found.fit.parameters));
-  }
+  Explained explained;
+  explained.estimate = certified_estimate(input, searched, estimated_log);
+  // Leaving out wants the covariance under the noise that was used.
+  const PerAxis<Eigen::VectorXd> stated_V = stated_means_V(search, found);
+  const PerAxis<LeftOutErrors> left_out = stated_errors(searched, stated_V);
+  explained.worst = worst_of(left_out);
+  allow_for_choices(estimated_search, search, codes, found);
   const std::vector<Rivals> rivals =
       find_rivals(search, searched.candidates, found, options.reach.value_or(reach_of(log)));
   const EnlargedEstimate if_true = found.fit;  // if what was found is what there is
@@ -266,24 +324,19 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   bare.effects.clear();
   const auto twelve_V = predict_means_V(log, bare);
   const Gravity& gravity = input.input.description.gravity;
-
-  const auto n = std::ssize(input.poses);
   const auto joint = joint_estimate(input, estimated_search, estimated);
   if (joint) {
     EnlargedEstimate filter{estimated.fit.parameters, joint->covariance};
     filter.parameters.set_free_values(joint->value);
     attach_filter(log, if_true, codes ? codes->with_converter(filter, found) : filter, diagnosis);
   }
-  PerAxis<bool> concerned{};
-  for (const ActiveEffect& active : found.fit.parameters.effects)
-    for (const std::size_t axis : axes_of(active)) concerned[axis] = true;
+
+  const PerAxis<bool> concerned = axes_concerned(found.fit.parameters);
   PerAxis<std::optional<AxisVerdictInput>> residual;
-  const double chi2 = found.fit.whitened_residual.head(mean_rows(log)).squaredNorm();
-  result.schwarz_criterion = schwarz_criterion(log, found);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double factor = found.fit.parameters.mps2_per_V(i);
-    result.final.batch_ls[i] = with_gravity(axis_of(if_true, i), gravity);
     const auto first = 4 * static_cast<Eigen::Index>(i);
+    result.final.batch_ls[i] = with_gravity(axis_of(if_true, i), gravity);
     result.final.ekf[i] = with_gravity(
         joint
             ? AxisEstimate{joint->value.segment<4>(first),
@@ -293,48 +346,32 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
     for (AxisEstimate* estimate : {&result.final.batch_ls[i], &result.final.ekf[i]})
       estimate->covariance += among.block<4, 4>(first, first);
+
     const Eigen::VectorXd residual_mps2 = factor * (stated_V[i] - predicted_V[i]);
+    for (Eigen::Index k = 0; k < residual_mps2.size(); ++k)
+      result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[i] = residual_mps2(k);
     result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
-    // The noise estimated beside the effects, not the one that had to take them up.
-    const auto block = jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
-    const Eigen::MatrixXd left_V2 =
-        found.noise[i].covariance - block * by_means.covariance * block.transpose();
-    const double floor_mps2 =
-        std::abs(factor) *
-        std::sqrt(std::max(
-            left_V2.trace() / static_cast<double>(n) + found.beyond_V2[i].value_or(0), 0.0));
-    if (result.floor_pose_rms_mps2[i] > 0) {
+    result.after.heldout_pose_rms_mps2[i] = rms(left_out[i].error_mps2);
+    result.after.heldout_pose_max_abs_mps2[i] = max_abs(left_out[i].error_mps2);
+    result.after.sample_rms_mps2[i] =
+        std::abs(factor) * sample_rms_V(input.input.run, predicted_V[i], i);
+    const Eigen::MatrixXd left_V2 = left_by_noise_V2(found, jacobian, by_means.covariance, i);
+    const double mean_square_V2 =
+        left_V2.trace() / static_cast<double>(left_V2.rows()) + found.beyond_V2[i].value_or(0);
+    const double floor_mps2 = std::abs(factor) * std::sqrt(std::max(mean_square_V2, 0.0));
+    if (result.floor_pose_rms_mps2[i] > 0)
       result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
-    }
     result.floor_pose_rms_mps2[i] = floor_mps2;
     if (concerned[i])
       residual[i] = {.rms_mps2 = result.before.fit_pose_rms_mps2[i],
                      .expected_mps2 = floor_mps2,
                      .u_expected_mps2 = std::hypot(result.u_floor_pose_rms_mps2[i],
                                                    std::abs(factor) * scatter_of_rms_V(left_V2))};
-    result.after.heldout_pose_rms_mps2[i] = rms(heldout_errors_mps2[i]);
-    result.after.heldout_pose_max_abs_mps2[i] = max_abs(heldout_errors_mps2[i]);
-    result.after.sample_rms_mps2[i] =
-        std::abs(factor) * sample_rms_V(input.input.run, predicted_V[i], i);
-    for (Eigen::Index k = 0; k < residual_mps2.size(); ++k) {
-      result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[i] = residual_mps2(k);
-    }
-    if (result.after.heldout_pose_max_abs_mps2[i] > explained.worst_error_mps2) {
-      explained.worst_error_mps2 = result.after.heldout_pose_max_abs_mps2[i];
-      explained.u_worst_mps2 = result.after.heldout_pose_rms_mps2[i];
-    }
   }
   result.fitted_terms =
       fitted_terms(log, found.fit.parameters, predicted_V, result.floor_pose_rms_mps2);
-  // What is left against the noise that was re-estimated beside the effects: all in all, and of
-  // each axis, since what is slow is many times the noise before it is much of χ².
-  const double dof = 3 * static_cast<double>(input.poses.size()) -
-                     static_cast<double>(found.fit.covariance.rows());
-  bool more_is_left = chi_squared_tail(chi2, dof) < 1e-4;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    more_is_left = more_is_left ||
-                   (residual[i] && is_far_beyond(result.after.fit_pose_rms_mps2[i], *residual[i]));
-  if (more_is_left && diagnosis.verdict == Verdict::explained)
+  if (diagnosis.verdict == Verdict::explained &&
+      more_is_left(input, found.fit, residual, result.after.fit_pose_rms_mps2))
     diagnosis.verdict = Verdict::partly_explained;
   diagnosis.axis_test = result.diagnosis.axis_test;
   add_noise_to(diagnosis, found.fit.parameters);

@@ -7,6 +7,7 @@
 #include "estimator/calibrate.h"
 #include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/diagnosis/noise_drivers.h"
+#include "estimator/error_figures.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/reml.h"
 #include "estimator/pose_means.h"
@@ -29,8 +30,7 @@ struct ExplainInput {
 
 /// What comes of a calibration after effects were added.
 struct Explained {
-  double worst_error_mps2 = -1;  ///< the largest on left-out poses; negative: there is none
-  double u_worst_mps2 = 0;
+  WorstError worst;             ///< on left-out poses
   PropagatedEstimate estimate;  ///< the twelve of the enlarged model
 };
 

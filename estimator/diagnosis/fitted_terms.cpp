@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 
+#include "estimator/angle_units.h"
 #include "estimator/effects/driver.h"
 #include "estimator/effects/smooth_term.h"
 
@@ -51,7 +52,6 @@ std::vector<const Driver*> likeliest_first(const std::vector<Driver>& drivers, s
 std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParameters& model,
                                      const PerAxis<Eigen::VectorXd>& predicted_V,
                                      const PerAxis<double>& expected_mps2) {
-  constexpr double kDegPerRad = 1 / effect::kRadPerDeg;
   const std::vector<Driver> drivers = instantaneous_drivers(log);
   std::multimap<double, FittedTerm, std::greater<>> by_size;  // equal ones stay in order
   for (std::size_t e = 0; e < model.effects.size(); ++e) {

@@ -12,8 +12,10 @@ namespace plumbline {
 Heldout::Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
                  const PoseWhitening& whitening)
     : log_(log), mean_V_(mean_V) {
-  parallel_for(kAxisCount,
-               [&](std::size_t i) { inverse_[i] = inverse_from_factor(whitening.lower[i]); });
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    inverse_[i] = inverse_from_factor(whitening.lower[i]);
+    mean_V2_[i] = whitening.lower[i].rowwise().squaredNorm();
+  });
 }
 
 namespace {
@@ -22,16 +24,10 @@ namespace {
 /// one that only this block determines would run away along its tangent, which no response does.
 std::vector<Eigen::Index> linear_parameters(const EnlargedFit& fit) {
   std::vector<Eigen::Index> linear;
-  Eigen::Index row = 0;
-  for (; row < 4 * static_cast<Eigen::Index>(kAxisCount); ++row) linear.push_back(row);
-  for (const ActiveEffect& active : fit.parameters.effects) {
-    const auto infos = active.effect->parameters();
-    for (std::size_t k = 0; k < infos.size(); ++k) {
-      if (!active.free[k]) continue;
-      if (infos[k].role != ParameterRole::shape) linear.push_back(row);
-      ++row;
-    }
-  }
+  for (Eigen::Index row = 0; row < fit.parameters.first_free(0); ++row) linear.push_back(row);
+  for (std::size_t e = 0; e < fit.parameters.effects.size(); ++e)
+    for (const EstimatedParameter& parameter : estimated_of(fit.parameters, e))
+      if (parameter.info.role != ParameterRole::shape) linear.push_back(parameter.row);
   return linear;
 }
 
@@ -60,6 +56,7 @@ std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
   for (LeftOut& left_out : result) {
     left_out.residual_V.fill(
         Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN()));
+    left_out.sd_V = left_out.residual_V;
     if (!fit.determined) left_out.power.fill(std::numeric_limits<double>::infinity());
   }
   if (!fit.determined) return result;
@@ -78,8 +75,7 @@ std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
     weighted_residual[i] = inverse_[i] * residual[i];
     weighted_jacobian[i] = inverse_[i] * axis_jacobian[i];
   }
-  const auto without = [&](const std::vector<Eigen::Index>& block,
-                           PerAxis<Eigen::VectorXd>& heldout) {
+  const auto without = [&](const std::vector<Eigen::Index>& block, LeftOut& left_out) {
     // A free parameter for every reading of the block is the same as leaving it out.
     const Eigen::Index size = std::ssize(block);
     Eigen::MatrixXd Z = Eigen::MatrixXd::Zero(3 * size, 3 * size);
@@ -97,12 +93,27 @@ std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
     const Eigen::VectorXd scale = Z.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     Eigen::MatrixXd scaled = scale.asDiagonal() * Z * scale.asDiagonal();
     scaled.diagonal().array() += 1e-9;
-    const Eigen::VectorXd d = scale.cwiseProduct(scaled.ldlt().solve(scale.cwiseProduct(right)));
-    const Eigen::VectorXd shift =
-        (covariance * (weighted.transpose() * d)).cwiseMax(-largest_shift).cwiseMin(largest_shift);
+    // The parameters shift by Q·(V⁻¹·residual)_B, as in heldout_residuals().
+    const Eigen::MatrixXd gain = covariance * weighted.transpose();
+    Eigen::MatrixXd Q =
+        scaled.ldlt().solve(scale.asDiagonal() * gain.transpose()).transpose() * scale.asDiagonal();
+    const Eigen::VectorXd shift = (Q * right).cwiseMax(-largest_shift).cwiseMin(largest_shift);
+    Eigen::MatrixXd added = Q * gain.transpose();
+    const Eigen::VectorXd within =
+        largest_shift.cwiseQuotient(added.diagonal().cwiseMax(1e-300).cwiseSqrt()).cwiseMin(1);
+    added = within.asDiagonal() * added * within.asDiagonal();
+    Q = within.asDiagonal() * Q;
     PerAxis<double> power;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
-      heldout[i](block) = residual[i](block) + axis_jacobian[i](block, Eigen::all) * shift;
+      const Eigen::MatrixXd J_B = axis_jacobian[i](block, Eigen::all);
+      left_out.residual_V[i](block) = residual[i](block) + J_B * shift;
+      Eigen::MatrixXd own = -J_B * gain;
+      own.middleCols(static_cast<Eigen::Index>(i) * size, size).diagonal().array() += 1;
+      const Eigen::VectorXd variance_V2 = mean_V2_[i](block) -
+                                          (J_B * covariance).cwiseProduct(J_B).rowwise().sum() +
+                                          2 * (J_B * Q).cwiseProduct(own).rowwise().sum() +
+                                          (J_B * added).cwiseProduct(J_B).rowwise().sum();
+      left_out.sd_V[i](block) = variance_V2.cwiseMax(0).cwiseSqrt();
       const Eigen::VectorXd seen =
           weighted_residual[i](block) + weighted_jacobian[i](block, Eigen::all) * shift;
       const Eigen::MatrixXd precision = inverse_[i](block, block);
@@ -116,7 +127,7 @@ std::vector<LeftOut> Heldout::leave_out(const EnlargedFit& fit,
   std::vector<PerAxis<double>> power(work.size());
   parallel_for(work.size(), [&](std::size_t w) {
     const auto [part, b] = work[w];
-    power[w] = without(partitions[part][b], result[part].residual_V);
+    power[w] = without(partitions[part][b], result[part]);
   });
   for (std::size_t w = 0; w < work.size(); ++w)
     for (std::size_t i = 0; i < kAxisCount; ++i) result[work[w].first].power[i] += power[w][i];

@@ -9,6 +9,7 @@ namespace plumbline {
 /// What a model leaves of poses that it was not fitted to.
 struct LeftOut {
   PerAxis<Eigen::VectorXd> residual_V;  ///< n each; NaN for poses in no block
+  PerAxis<Eigen::VectorXd> sd_V;        ///< n each, under the noise and with shapes that are known
   /// Sum of squares of an axis in units of the noise, of which the readings outside a block tell a
   /// part: slow noise hides nothing here. About the number of poses for the truth; infinite, and no
   /// residual, for a fit that is not determined.
@@ -32,6 +33,7 @@ class Heldout {
   const VisitLog& log_;
   const PerAxis<Eigen::VectorXd>& mean_V_;
   PerAxis<Eigen::MatrixXd> inverse_;  ///< of the covariance of the pose means
+  PerAxis<Eigen::VectorXd> mean_V2_;  ///< their variances
 };
 
 /// Share of the excess of a sum of squares over what noise leaves of it that an effect removes.

@@ -28,16 +28,17 @@ bool has_no_time_constant(const VisitLog& log, const EnlargedFit& fit, std::size
   if (!in_dwell && !active.effect->remembers()) return false;
   const Visit& visit = log.visits.front();
   const double longest_s = kDwells * visit.duration_s();
-  Eigen::Index row = fit.parameters.first_free(effect);
+  const auto is_time_constant = [](const ParameterInfo& info) {
+    return info.role == ParameterRole::shape && info.unit == "s";
+  };
   const auto infos = active.effect->parameters();
   for (std::size_t k = 0; k < infos.size(); ++k) {
-    if (infos[k].role == ParameterRole::shape && infos[k].unit == "s") {
-      const double tau_s = active.p[k];
-      const bool known = active.free[k] ? fit.covariance(row, row) <= tau_s * tau_s : in_dwell;
-      if (!known || (in_dwell && tau_s > longest_s)) return true;
-    }
-    row += active.free[k] ? 1 : 0;
+    if (!is_time_constant(infos[k])) continue;
+    if (in_dwell ? active.p[k] > longest_s : !active.free[k]) return true;
   }
+  for (const EstimatedParameter& tau : estimated_of(fit.parameters, effect))
+    if (is_time_constant(tau.info) && !(fit.covariance(tau.row, tau.row) <= tau.value * tau.value))
+      return true;
   return false;
 }
 
@@ -68,15 +69,10 @@ double coincidence(const VisitLog& log, const ActiveEffect& active) {
 /// Whether of an amplitude, without which the effect is another, next to nothing is known.
 bool lacks_what_it_needs(const EnlargedFit& fit, std::size_t effect) {
   constexpr double kKnown = 4;  // standard uncertainties
-  const ActiveEffect& active = fit.parameters.effects[effect];
-  Eigen::Index row = fit.parameters.first_free(effect);
-  const auto infos = active.effect->parameters();
-  for (std::size_t k = 0; k < infos.size(); ++k) {
-    if (!active.free[k]) continue;
-    if (infos[k].needed && std::abs(active.p[k]) < kKnown * std::sqrt(fit.covariance(row, row)))
+  for (const EstimatedParameter& size : estimated_of(fit.parameters, effect))
+    if (size.info.needed &&
+        std::abs(size.value) < kKnown * std::sqrt(fit.covariance(size.row, size.row)))
       return true;
-    ++row;
-  }
   return false;
 }
 

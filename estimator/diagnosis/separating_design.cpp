@@ -34,8 +34,8 @@ VisitLog extended(const VisitLog& log, const std::vector<Stop>& stops, double sa
   for (const Stop& stop : stops) {
     const Visit before = longer.visits.back();
     Visit visit = before;
-    visit.delta_rad = stop.delta_deg * effect::kRadPerDeg;
-    visit.h_rad = stop.h_deg * effect::kRadPerDeg;
+    visit.delta_rad = stop.delta_deg * kRadPerDeg;
+    visit.h_rad = stop.h_deg * kRadPerDeg;
     visit.count = count;
     visit.step_s = first.step_s;
     const double longer_s =

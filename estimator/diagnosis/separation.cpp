@@ -84,10 +84,10 @@ bool is_same_to_gravity(const ActiveEffect& found, std::span<const ActiveEffect>
 HeadReach reach_of(const VisitLog& log) {
   HeadReach reach{1e9, -1e9, 1e9, -1e9, false};
   for (const Visit& visit : log.visits) {
-    reach.delta_min_deg = std::min(reach.delta_min_deg, visit.delta_rad / effect::kRadPerDeg);
-    reach.delta_max_deg = std::max(reach.delta_max_deg, visit.delta_rad / effect::kRadPerDeg);
-    reach.h_min_deg = std::min(reach.h_min_deg, visit.h_rad / effect::kRadPerDeg);
-    reach.h_max_deg = std::max(reach.h_max_deg, visit.h_rad / effect::kRadPerDeg);
+    reach.delta_min_deg = std::min(reach.delta_min_deg, visit.delta_rad / kRadPerDeg);
+    reach.delta_max_deg = std::max(reach.delta_max_deg, visit.delta_rad / kRadPerDeg);
+    reach.h_min_deg = std::min(reach.h_min_deg, visit.h_rad / kRadPerDeg);
+    reach.h_max_deg = std::max(reach.h_max_deg, visit.h_rad / kRadPerDeg);
   }
   return reach;
 }

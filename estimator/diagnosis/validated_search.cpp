@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/validated_search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <utility>
@@ -27,19 +28,20 @@ class Validation {
     return heldout_.leave_out(fit, partitions_);
   }
 
-  /// Errors in both partitions, m/s², 2n an axis.
-  PerAxis<Eigen::VectorXd> errors_mps2(const EnlargedFit& fit) const {
+  PerAxis<LeftOutErrors> errors(const EnlargedFit& fit) const {
     const std::vector<LeftOut> parts = leave_out(fit);
-    PerAxis<Eigen::VectorXd> all;
+    PerAxis<LeftOutErrors> all;
     for (std::size_t i = 0; i < kAxisCount; ++i) {
-      all[i].resize(parts[0].residual_V[i].size() + parts[1].residual_V[i].size());
-      all[i] << parts[0].residual_V[i], parts[1].residual_V[i];
-      all[i] *= fit.parameters.mps2_per_V(i);
+      const double factor = fit.parameters.mps2_per_V(i);
+      const auto n = parts[0].residual_V[i].size();
+      all[i] = {Eigen::VectorXd(2 * n), Eigen::VectorXd(2 * n)};
+      all[i].error_mps2 << factor * parts[0].residual_V[i], factor * parts[1].residual_V[i];
+      all[i].u_mps2 << std::abs(factor) * parts[0].sd_V[i], std::abs(factor) * parts[1].sd_V[i];
     }
     return all;
   }
   double rms_mps2(const EnlargedFit& fit, std::size_t axis) const {
-    return rms(errors_mps2(fit)[axis]);
+    return rms(errors(fit)[axis].error_mps2);
   }
 
   EnlargedFit fit_without(std::size_t k) const {
@@ -171,7 +173,7 @@ void renew_responses(const SearchInput& search, ValidatedSearch& result) {
 void keep_what_carries(const SearchInput& search, const std::vector<PoseMean>& poses,
                        ValidatedSearch& result) {
   result.gains.clear();
-  result.heldout_mps2 = {};
+  result.left_out = {};
   SearchResult& found = result.found;
   if (found.evidence.empty()) return;
   const Validation validation(search.log, poses, found);
@@ -188,7 +190,7 @@ void keep_what_carries(const SearchInput& search, const std::vector<PoseMean>& p
   } else {
     drop_what_does_not_carry(search.log, validation, found, result.gains);
   }
-  if (!found.evidence.empty()) result.heldout_mps2 = validation.errors_mps2(found.fit);
+  if (!found.evidence.empty()) result.left_out = validation.errors(found.fit);
 }
 
 std::vector<std::size_t> families_of(const SearchResult& found) {

@@ -8,6 +8,7 @@
 
 #include "estimator/diagnosis/code_estimate.h"
 #include "estimator/diagnosis/search.h"
+#include "estimator/error_figures.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
@@ -19,9 +20,7 @@ struct ValidatedSearch {
   std::optional<CodeEstimate> codes;
   /// Of each effect found: share of the excess power of left-out poses that it removes.
   std::vector<double> gains;
-  /// Of the model found, on poses that were left out in blocks of time, then of position: 2n errors
-  /// an axis, m/s². Empty where nothing was found.
-  PerAxis<Eigen::VectorXd> heldout_mps2;
+  PerAxis<LeftOutErrors> left_out;  ///< of the model found; empty where nothing was
 };
 
 /// Searches the residual of a finished 12-parameter calibration whose errors on left-out poses are

@@ -116,7 +116,7 @@ class BaseTilt final : public SmoothTerm {
     return hypothesis;
   }
   void tilt(double by_rad, const double* p, HeadGeometry& head) const {
-    const double direction_rad = p[term_->parameters().size()] * effect::kRadPerDeg;
+    const double direction_rad = p[term_->parameters().size()] * kRadPerDeg;
     head.h_rad += by_rad * std::cos(direction_rad);
     head.roll_rad += by_rad * std::sin(direction_rad);
   }

@@ -44,7 +44,7 @@ class DrivenTerm : public SmoothTerm {
   }
   void displace_by_number(const VisitLog& log, std::size_t visit, double f, const double*,
                           HeadGeometry& head) const override {
-    head.*target_.angle += f * target_.factor_at(log.visits[visit]) * effect::kRadPerDeg;
+    head.*target_.angle += f * target_.factor_at(log.visits[visit]) * kRadPerDeg;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const double f = driver_->output_of == input.axis ? at(input.output_V, p)

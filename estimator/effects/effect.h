@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "estimator/angle_units.h"
 #include "estimator/effects/visit_log.h"
 
 namespace plumbline {
@@ -186,7 +187,6 @@ class Effect {
 /// Helpers that several effects share.
 namespace effect {
 
-inline constexpr double kRadPerDeg = 0.017453292519943295;
 inline constexpr double kTurn_rad = 360 * kRadPerDeg;
 /// Instants within a dwell are looked for in so many parts of it.
 inline constexpr std::size_t kPartsOfDwell = 8;

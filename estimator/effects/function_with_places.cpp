@@ -145,7 +145,7 @@ class Sector final : public DrivenTerm {
                                  const Hypothesis& found) const override {
     // Between two positions nothing moves an edge: each is tried at several.
     constexpr int kPlaces = 3;
-    constexpr double kApart_rad = 5 * effect::kRadPerDeg;
+    constexpr double kApart_rad = 5 * kRadPerDeg;
     std::vector<Hypothesis> others;
     for (int low = -kPlaces; low <= kPlaces; ++low)
       for (int high = -kPlaces; high <= kPlaces; ++high) {
@@ -157,7 +157,7 @@ class Sector final : public DrivenTerm {
   }
 
  private:
-  static constexpr double kEdge_rad = 1 * effect::kRadPerDeg;
+  static constexpr double kEdge_rad = 1 * kRadPerDeg;
   static constexpr double kFine = 0.1;
 
   std::string function() const override { return "sector"; }
@@ -309,7 +309,7 @@ class Thrown final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   std::vector<ParameterInfo> parameters() const override {
-    constexpr double kFine_rad = 0.1 * effect::kRadPerDeg;
+    constexpr double kFine_rad = 0.1 * kRadPerDeg;
     return {{"middle", "rad", ParameterRole::shape, kFine_rad, true},
             {"softness", "", ParameterRole::shape},
             {"p", target().unit(), ParameterRole::amplitude}};

@@ -67,7 +67,7 @@ class HeadDecay final : public SmoothTerm {
       case DecayOf::one:
         break;
       case DecayOf::weight:
-        return p[0] * std::cos(at.h_rad) * effect::kRadPerDeg;
+        return p[0] * std::cos(at.h_rad) * kRadPerDeg;
       case DecayOf::way: {
         const Visit* before = log.before(visit);
         if (before == nullptr) return 0;
@@ -76,7 +76,7 @@ class HeadDecay final : public SmoothTerm {
                            : before->h_rad - at.h_rad);
       }
     }
-    return p[0] * effect::kRadPerDeg;
+    return p[0] * kRadPerDeg;
   }
 
   double HeadGeometry::*angle_;

@@ -178,7 +178,7 @@ class MemoryTerm final : public SmoothTerm {
   }
   void displace_by_number(const VisitLog&, std::size_t, double f, const double*,
                           HeadGeometry& head) const override {
-    head.*target_.angle += f * effect::kRadPerDeg;
+    head.*target_.angle += f * kRadPerDeg;
   }
   std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t axis,
                                         const double* p) const override {

@@ -15,7 +15,7 @@ class AxisSkew final : public Effect {
     return {{{effect::kSmallAngle_deg}}};
   }
   void displace(const VisitLog&, std::size_t, const double* p, HeadGeometry& head) const override {
-    head.skew_rad += p[0] * effect::kRadPerDeg;
+    head.skew_rad += p[0] * kRadPerDeg;
   }
 };
 

@@ -61,7 +61,7 @@ class Backlash final : public Effect {
                                  ? direction_at(log, visit, way, start)
                                  : 0.5 * (direction_at(log, visit, kShorter, start) +
                                           direction_at(log, visit, kShorterOtherHalf, start));
-    head.delta_rad += 0.5 * p[0] * direction * effect::kRadPerDeg;
+    head.delta_rad += 0.5 * p[0] * direction * kRadPerDeg;
   }
   std::vector<std::vector<double>> left_open_by(const RunHistory& run,
                                                 const std::vector<double>& p) const override {

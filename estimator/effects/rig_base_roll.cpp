@@ -15,7 +15,7 @@ class BaseRoll final : public Effect {
     return {{{effect::kSmallAngle_deg}}};
   }
   void displace(const VisitLog&, std::size_t, const double* p, HeadGeometry& head) const override {
-    head.roll_rad += p[0] * effect::kRadPerDeg;
+    head.roll_rad += p[0] * kRadPerDeg;
   }
 };
 

@@ -19,7 +19,7 @@ class DeltaEccentricity final : public Effect {
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     const double phase = log.visits[visit].delta_rad;
-    head.delta_rad += (p[0] * std::cos(phase) + p[1] * std::sin(phase)) * effect::kRadPerDeg;
+    head.delta_rad += (p[0] * std::cos(phase) + p[1] * std::sin(phase)) * kRadPerDeg;
   }
 };
 

@@ -32,7 +32,7 @@ class DeltaPeriodic final : public Effect {
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     const double phase = p[0] * log.visits[visit].delta_rad;
-    head.delta_rad += (p[1] * std::cos(phase) + p[2] * std::sin(phase)) * effect::kRadPerDeg;
+    head.delta_rad += (p[1] * std::cos(phase) + p[2] * std::sin(phase)) * kRadPerDeg;
   }
 };
 

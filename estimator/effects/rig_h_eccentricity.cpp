@@ -19,7 +19,7 @@ class TiltEccentricity final : public Effect {
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     const double h = log.visits[visit].h_rad;
-    head.h_rad += (p[0] * std::cos(h) + p[1] * std::sin(h)) * effect::kRadPerDeg;
+    head.h_rad += (p[0] * std::cos(h) + p[1] * std::sin(h)) * kRadPerDeg;
   }
 };
 

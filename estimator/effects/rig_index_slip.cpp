@@ -21,7 +21,7 @@ class IndexSlip final : public Effect {
   }
   void displace(const VisitLog&, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    if (static_cast<double>(visit) >= p[1]) head.delta_rad += p[0] * effect::kRadPerDeg;
+    if (static_cast<double>(visit) >= p[1]) head.delta_rad += p[0] * kRadPerDeg;
   }
   std::optional<std::size_t> sets_in_at(const VisitLog&,
                                         const std::vector<double>& p) const override {

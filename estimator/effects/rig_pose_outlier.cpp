@@ -26,8 +26,8 @@ class PoseOutlier final : public Effect {
   void displace(const VisitLog&, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     if (static_cast<double>(visit) != p[0]) return;
-    head.delta_rad += p[1] * effect::kRadPerDeg;
-    head.h_rad += p[2] * effect::kRadPerDeg;
+    head.delta_rad += p[1] * kRadPerDeg;
+    head.h_rad += p[2] * kRadPerDeg;
   }
   bool carries_over() const override { return false; }
 };

@@ -33,10 +33,10 @@ class SwingingAngle final : public SmoothTerm {
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*angle_ += p[0] * effect::kRadPerDeg * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
+    head.*angle_ += p[0] * kRadPerDeg * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    return {angle_, p[0] * effect::kRadPerDeg * effect::sine(log.visits[visit], p[1], p[2])};
+    return {angle_, p[0] * kRadPerDeg * effect::sine(log.visits[visit], p[1], p[2])};
   }
   void normalise(std::vector<double>& p) const override { effect::normalise_sine(p[0], p[2]); }
 

@@ -7,14 +7,13 @@
 #include <numbers>
 #include <numeric>
 
+#include "estimator/angle_units.h"
 #include "estimator/fit/rounding.h"
 #include "estimator/parallel_for.h"
 #include "estimator/pose_means.h"
 
 namespace plumbline {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 double mean_of(const std::vector<double>& column, const Pose& pose) {
   const auto begin = column.begin() + static_cast<std::ptrdiff_t>(pose.first);

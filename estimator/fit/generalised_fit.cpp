@@ -113,20 +113,21 @@ std::optional<GeneralisedFit> fit_generalised(const Eigen::MatrixXd& A, const Ei
   return fit;
 }
 
-Eigen::VectorXd heldout_residuals_V(const Eigen::MatrixXd& A, const Eigen::VectorXd& y,
-                                    const Eigen::MatrixXd& V,
-                                    const std::vector<std::vector<Eigen::Index>>& blocks) {
+HeldoutResiduals heldout_residuals(const Eigen::MatrixXd& A, const Eigen::VectorXd& y,
+                                   const Eigen::MatrixXd& V,
+                                   const std::vector<std::vector<Eigen::Index>>& blocks) {
   const Eigen::Index n = A.rows();
-  Eigen::VectorXd residuals =
-      Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
+  HeldoutResiduals heldout;
+  heldout.residual_V = Eigen::VectorXd::Constant(n, std::numeric_limits<double>::quiet_NaN());
+  heldout.sd_V = heldout.residual_V;
   const Eigen::LLT<Eigen::MatrixXd> cholesky(V);
-  if (cholesky.info() != Eigen::Success) return residuals;
+  if (cholesky.info() != Eigen::Success) return heldout;
 
   // Z = V⁻¹ − V⁻¹·A·C·Aᵀ·V⁻¹; a block's free parameters are d = Z_BB⁻¹·(Z·y)_B, and the fit to the
   // rest is x − gain_B·d.
   const Eigen::MatrixXd V_inverse = inverse_from_factor(cholesky.matrixLLT());
   const std::optional<GeneralisedFit> fit = fit_generalised(A, y, V);
-  if (!fit) return residuals;
+  if (!fit) return heldout;
   const Eigen::MatrixXd V_inverse_A = V_inverse * A;
   const Eigen::VectorXd Z_y = cholesky.solve(fit->residual_V);
 
@@ -144,11 +145,21 @@ Eigen::VectorXd heldout_residuals_V(const Eigen::MatrixXd& A, const Eigen::Vecto
     const Eigen::MatrixXd weighted = V_inverse_A(block, Eigen::all);
     const Eigen::MatrixXd Z_BB =
         V_inverse(block, block) - weighted * fit->estimate.covariance * weighted.transpose();
-    const Eigen::VectorXd d = Z_BB.llt().solve(Z_y(block));
-    const Eigen::Vector4d x = fit->estimate.value - fit->gain(Eigen::all, block) * d;
-    residuals(block) = y(block) - A(block, Eigen::all) * x;
+    const Eigen::MatrixXd A_B = A(block, Eigen::all), gain = fit->gain(Eigen::all, block);
+    // x_{−B} = x − Q·(Z·y)_B
+    const Eigen::MatrixXd Q = Z_BB.llt().solve(gain.transpose()).transpose();
+    heldout.residual_V(block) = y(block) - A_B * (fit->estimate.value - Q * Z_y(block));
+    // Its covariance: V − A·C·Aᵀ is that of the residuals, Z_BB that of (Z·y)_B, and between them
+    // stands I − A·gain.
+    const Eigen::MatrixXd own =
+        Eigen::MatrixXd::Identity(std::ssize(block), std::ssize(block)) - A_B * gain;
+    const Eigen::MatrixXd A_Q = A_B * Q;
+    const Eigen::VectorXd variance_V2 =
+        fit->residual_covariance_V2.diagonal()(block) + 2 * A_Q.cwiseProduct(own).rowwise().sum() +
+        (A_B * (Q * gain.transpose())).cwiseProduct(A_B).rowwise().sum();
+    heldout.sd_V(block) = variance_V2.cwiseMax(0).cwiseSqrt();
   }
-  return residuals;
+  return heldout;
 }
 
 }  // namespace plumbline

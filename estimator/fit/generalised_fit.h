@@ -33,12 +33,18 @@ struct GeneralisedFit {
 std::optional<GeneralisedFit> fit_generalised(const Eigen::MatrixXd& A, const Eigen::VectorXd& y,
                                               const Eigen::MatrixXd& V);
 
+/// Residuals of poses against fits to others, each with its standard deviation under V.
+struct HeldoutResiduals {
+  Eigen::VectorXd residual_V;  ///< n
+  Eigen::VectorXd sd_V;        ///< n, √diag of the covariance of y_B − A_B·x_{−B}
+};
+
 /// Residuals y_B − A_B·x_{−B} of the poses in `block` against the fit to all others, without
-/// refitting: poses given a free parameter each are poses left out. Returns n residuals, one per
-/// pose, for blocks that together leave out every pose at most once; poses of a block without which
-/// the rest no longer determines the parameters, and poses in no block, are NaN.
-Eigen::VectorXd heldout_residuals_V(const Eigen::MatrixXd& A, const Eigen::VectorXd& y,
-                                    const Eigen::MatrixXd& V,
-                                    const std::vector<std::vector<Eigen::Index>>& blocks);
+/// refitting: poses given a free parameter each are poses left out. One per pose, for blocks that
+/// together leave out every pose at most once; poses of a block without which the rest no longer
+/// determines the parameters, and poses in no block, are NaN.
+HeldoutResiduals heldout_residuals(const Eigen::MatrixXd& A, const Eigen::VectorXd& y,
+                                   const Eigen::MatrixXd& V,
+                                   const std::vector<std::vector<Eigen::Index>>& blocks);
 
 }  // namespace plumbline

@@ -5,8 +5,8 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
+#include "estimator/angle_units.h"
 #include "estimator/fit/generalised_fit.h"
 #include "estimator/fit/least_squares.h"
 #include "estimator/pose_means.h"
@@ -14,8 +14,6 @@
 
 namespace plumbline {
 namespace {
-
-constexpr double kDegPerRad = 180 / std::numbers::pi;
 
 /// Twelve parameters in the gauge of the nine: a = K⁻¹·(U − U0), turned so that the matrix is upper
 /// triangular.
@@ -102,7 +100,6 @@ std::optional<HeadComparison> compare_with_head(const ScalarInput& input,
   const double sign = R.determinant() < 0 ? -1 : 1;
   head.mounting_deg = kDegPerRad * Eigen::AngleAxisd(Eigen::Matrix3d(sign * R)).angle();
   // Two of three components of the noise turn the direction; positioning adds both angles.
-  constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
   const AngleUncertainty& u = input.description.angles;
   const double scatter_rad = scatter_mps2 / gravity.local_mps2;
   head.expected_direction_rms_deg =

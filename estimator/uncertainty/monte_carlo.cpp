@@ -4,8 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "estimator/angle_units.h"
 #include "estimator/kinematics.h"
 #include "estimator/parallel_for.h"
 
@@ -136,7 +136,6 @@ Eigen::MatrixXd slopes(const std::vector<Pose>& poses, const Eigen::Vector3d& K,
 
 Model make_model(const PropagatedEstimate& estimate, const std::vector<Pose>& poses,
                  const RunDescription& run) {
-  constexpr double kRadPerArcsec = std::numbers::pi / 180 / 3600;
   const double gamma = run.gravity.local_mps2 / kStandardGravity_mps2;
   Model model{.estimate = estimate,
               .poses = std::ssize(poses),

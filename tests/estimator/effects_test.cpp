@@ -180,8 +180,7 @@ TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
                                                                : before.h_rad - at.h_rad;
       for (const Hypothesis& start : starts) {
         const ActiveEffect active = activate(*effect, 0, start);
-        const double rad_of[] = {effect::kRadPerDeg, effect::kRadPerDeg * std::cos(at.h_rad),
-                                 way_rad};
+        const double rad_of[] = {kRadPerDeg, kRadPerDeg * std::cos(at.h_rad), way_rad};
         Eigen::VectorXd reading_V(8);
         for (Eigen::Index m = 0; m < 8; ++m) {
           HeadGeometry head{at.delta_rad, at.h_rad};

@@ -115,16 +115,25 @@ TEST(GeneralisedFit, HeldOutResidualsAreThoseOfARefit) {
   const Eigen::VectorXd y = noisy_voltages(A, 2);
   const Eigen::MatrixXd V = coloured_covariance(A.rows());
   for (const Blocks& blocks : {time_blocks(poses), position_blocks(poses)}) {
-    const Eigen::VectorXd fast = heldout_residuals_V(A, y, V, blocks);
-    ASSERT_TRUE(fast.allFinite());
+    const HeldoutResiduals fast = heldout_residuals(A, y, V, blocks);
+    ASSERT_TRUE(fast.residual_V.allFinite());
     for (const auto& block : blocks) {
       std::vector<Eigen::Index> rest;
       for (Eigen::Index row = 0; row < A.rows(); ++row)
         if (std::find(block.begin(), block.end(), row) == block.end()) rest.push_back(row);
       const auto refit = fit_generalised(A(rest, Eigen::all), y(rest), V(rest, rest));
       ASSERT_TRUE(refit);
-      for (const Eigen::Index row : block)
-        EXPECT_NEAR(fast(row), y(row) - A.row(row).dot(refit->estimate.value), 1e-12);
+      // y_B − A_B·(gain of the rest)·y_rest, of readings that are correlated
+      const Eigen::MatrixXd by_rest = A(block, Eigen::all) * refit->gain;
+      const Eigen::MatrixXd between = by_rest * V(rest, block);
+      const Eigen::MatrixXd covariance = V(block, block) - between - between.transpose() +
+                                         by_rest * V(rest, rest) * by_rest.transpose();
+      for (std::size_t k = 0; k < block.size(); ++k) {
+        const Eigen::Index row = block[k];
+        EXPECT_NEAR(fast.residual_V(row), y(row) - A.row(row).dot(refit->estimate.value), 1e-12);
+        const auto at = static_cast<Eigen::Index>(k);
+        EXPECT_NEAR(fast.sd_V(row), std::sqrt(covariance(at, at)), 1e-9 * fast.sd_V(row));
+      }
     }
   }
 }
@@ -134,7 +143,7 @@ TEST(GeneralisedFit, BlocksThatCannotBeSparedAreNotHeldOut) {
   const Eigen::MatrixXd A = design_matrix(poses, {});
   const Eigen::VectorXd y = noisy_voltages(A, 3);
   const Eigen::VectorXd heldout =
-      heldout_residuals_V(A, y, Eigen::MatrixXd::Identity(5, 5), {{0}, {4}});
+      heldout_residuals(A, y, Eigen::MatrixXd::Identity(5, 5), {{0}, {4}}).residual_V;
   EXPECT_TRUE(std::isfinite(heldout(0)));
   EXPECT_TRUE(std::isnan(heldout(4)));  // the only pose that sees a_z
   EXPECT_TRUE(std::isnan(heldout(1)));  // in no block

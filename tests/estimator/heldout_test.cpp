@@ -61,6 +61,13 @@ TEST(Heldout, IsWhatARefitLeavesAndTheOtherReadingsDoNotForetell) {
           (B.transpose() * weight * B).ldlt().solve(B.transpose() * weight * y(rest));
       const Eigen::VectorXd error = y(block) - A(block, Eigen::all) * x;
       EXPECT_LT((left[0].residual_V[i](block) - error).norm(), 1e-5 * error.norm());
+      const Eigen::MatrixXd by_rest =
+          A(block, Eigen::all) * (B.transpose() * weight * B).ldlt().solve(B.transpose() * weight);
+      const Eigen::MatrixXd between = by_rest * V(rest, block);
+      const Eigen::MatrixXd covariance = V(block, block) - between - between.transpose() +
+                                         by_rest * V(rest, rest) * by_rest.transpose();
+      const Eigen::VectorXd sd = covariance.diagonal().cwiseSqrt();
+      EXPECT_LT((left[0].sd_V[i](block) - sd).norm(), 1e-5 * sd.norm());
       // Given the readings outside the block, its noise has another mean and another covariance.
       const Eigen::MatrixXd from_rest = V(block, rest) * weight;
       const Eigen::VectorXd surprise = error - from_rest * (y(rest) - B * x);

@@ -133,8 +133,8 @@ void score_oracle(const StudySet& set, SetOutcome& outcome) {
     const Eigen::VectorXd ordinary = solve_least_squares(A, y).x;
     ordinary_mps2[i] = fresh_rms(set, factor * (y_fresh - A_fresh * ordinary));
     Eigen::VectorXd heldout(2 * y.size());
-    heldout << heldout_residuals_V(A, y, set.covariance_V2[i], time_blocks(poses)),
-        heldout_residuals_V(A, y, set.covariance_V2[i], position_blocks(poses));
+    heldout << heldout_residuals(A, y, set.covariance_V2[i], time_blocks(poses)).residual_V,
+        heldout_residuals(A, y, set.covariance_V2[i], position_blocks(poses)).residual_V;
     heldout_mps2[i] = rms(factor * heldout);
   }
   outcome.oracle = {over_axes(fresh_mps2), over_axes(heldout_mps2)};
