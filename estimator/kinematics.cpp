@@ -1,5 +1,6 @@
 #include "estimator/kinematics.h"
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "estimator/angle_units.h"
@@ -16,7 +17,11 @@ Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma) {
   const double up_x = ch * ce;
   const double up_y = sn * sh * ce - cn * se;
   const double up_z = cn * sh * ce + sn * se;
-  return gamma * Eigen::Vector3d(up_x * cd + up_y * sd, -up_x * sd + up_y * cd, up_z);
+  const Eigen::Vector3d on_table(up_x * cd + up_y * sd, -up_x * sd + up_y * cd, up_z);
+  if (head.seat_x_rad == 0 && head.seat_y_rad == 0) return gamma * on_table;
+  const auto turned = Eigen::AngleAxisd(head.seat_y_rad, Eigen::Vector3d::UnitY()) *
+                      Eigen::AngleAxisd(head.seat_x_rad, Eigen::Vector3d::UnitX());
+  return gamma * (turned.inverse() * on_table);
 }
 
 SpecificForce specific_force(double delta_deg, double h_deg, double gamma) {

@@ -10,13 +10,15 @@ namespace plumbline {
 struct HeadGeometry {
   double delta_rad = 0;
   double h_rad = 0;
-  double roll_rad = 0;  ///< of the base about x_b
-  double skew_rad = 0;  ///< of the spindle against the normal of the tilt axis
+  double roll_rad = 0;    ///< of the base about x_b
+  double skew_rad = 0;    ///< of the spindle against the normal of the tilt axis
+  double seat_x_rad = 0;  ///< of the triad on the turntable about its own x, after that about y
+  double seat_y_rad = 0;
 
   bool operator==(const HeadGeometry&) const = default;
 };
 
-/// Specific force in the sensor frame, standard g. With zero roll and skew this is
+/// Specific force in the sensor frame, standard g. With δ and h alone this is
 /// γ·(cos h cos δ, −cos h sin δ, sin h).
 Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma);
 

@@ -11,12 +11,15 @@
 namespace plumbline {
 namespace {
 
-/// The last parameter is the direction: 0 tilts as h does, 90° as the base roll does.
+/// The last parameter is the direction: 0 tilts as h does, or about y, 90° as the base roll does,
+/// or about x.
 class BaseTilt final : public SmoothTerm {
  public:
   explicit BaseTilt(std::unique_ptr<SmoothTerm> term)
       : term_(std::move(term)),
-        function_(term_->shape().substr(0, term_->shape().rfind(kTilt.words()))) {}
+        of_seat_(term_->shape().ends_with(kSeat.words())),
+        function_(
+            term_->shape().substr(0, term_->shape().rfind((of_seat_ ? kSeat : kTilt).words()))) {}
 
   std::string id() const override { return term_->id(); }
   const std::string& driver() const override { return term_->driver(); }
@@ -37,11 +40,14 @@ class BaseTilt final : public SmoothTerm {
                      .direction = true});
     return infos;
   }
-  /// Along the axes of the base it is a function of h or of the roll.
+  /// Along the axes of the base it is a function of h or of the roll; of the seat it is nothing
+  /// else.
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
+    const std::vector<double> directions_deg =
+        of_seat_ ? std::vector{-60.0, 0.0, 60.0} : std::vector{-45.0, 45.0};
     std::vector<Hypothesis> starts;
     for (const Hypothesis& of_term : term_->hypotheses(log, axis))
-      for (const double direction_deg : {-45.0, 45.0})
+      for (const double direction_deg : directions_deg)
         starts.push_back(towards(of_term, direction_deg));
     return starts;
   }
@@ -66,8 +72,10 @@ class BaseTilt final : public SmoothTerm {
                                  const std::vector<std::vector<double>>& p) const override {
     constexpr double kBeside_deg = 20, kRoll_deg = 90;
     std::vector<Hypothesis> found;
-    if (p.size() != 1) return found;
-    if (dynamic_cast<const BaseTilt*>(&repeated) != nullptr && &repeated != this) {
+    if (p.size() != 1 || of_seat_) return found;
+    const auto* tilted = dynamic_cast<const BaseTilt*>(&repeated);
+    if (tilted != nullptr && tilted->of_seat_) return found;
+    if (tilted != nullptr && tilted != this) {
       if (remembers()) return found;  // a little nearer, but far more than one function
       for (const Hypothesis& of_term : term_->hypotheses(log, axis))
         found.push_back(towards(of_term, p.front().back()));
@@ -91,13 +99,13 @@ class BaseTilt final : public SmoothTerm {
                 HeadGeometry& head) const override {
     HeadGeometry by;
     term_->displace(log, visit, p, by);
-    tilt(by.h_rad, p, head);
+    tilt(by, p, head);
   }
   void displace_by_number(const VisitLog& log, std::size_t visit, double number, const double* p,
                           HeadGeometry& head) const override {
     HeadGeometry by;
     term_->displace_by_number(log, visit, number, p, by);
-    tilt(by.h_rad, p, head);
+    tilt(by, p, head);
   }
   void normalise(std::vector<double>& p) const override {
     const double turned_deg = std::remainder(p.back(), 180);
@@ -115,13 +123,20 @@ class BaseTilt final : public SmoothTerm {
     hypothesis.p.push_back(direction_deg);
     return hypothesis;
   }
-  void tilt(double by_rad, const double* p, HeadGeometry& head) const {
+  void tilt(const HeadGeometry& by, const double* p, HeadGeometry& head) const {
     const double direction_rad = p[term_->parameters().size()] * kRadPerDeg;
-    head.h_rad += by_rad * std::cos(direction_rad);
-    head.roll_rad += by_rad * std::sin(direction_rad);
+    const double cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
+    if (of_seat_) {
+      head.seat_y_rad += by.seat_y_rad * cosine;
+      head.seat_x_rad += by.seat_y_rad * sine;
+    } else {
+      head.h_rad += by.h_rad * cosine;
+      head.roll_rad += by.h_rad * sine;
+    }
   }
 
   std::unique_ptr<SmoothTerm> term_;
+  bool of_seat_;
   std::string function_;  ///< without what it acts on
 };
 

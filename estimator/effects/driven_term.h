@@ -54,6 +54,16 @@ class DrivenTerm : public SmoothTerm {
   double term_of_number_g(const TermInput& input, double f) const override {
     return f * target_.factor(input);
   }
+  /// What tilts the base towards a direction may do so along an axis after all.
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& p) const override {
+    const auto* other = dynamic_cast<const SmoothTerm*>(&repeated);
+    const bool along_an_axis = target_.words() == kH.words() || target_.words() == kRoll.words();
+    if (!along_an_axis || other == nullptr || p.size() != 1 ||
+        !other->is(driver(), to_string(form()), function() + kTilt.words()))
+      return {};
+    return {{{p.front().begin(), p.front().end() - 1}}};
+  }
   std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t axis,
                                         const double* p) const override {
     std::vector<double> f;

@@ -169,7 +169,9 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   const auto add = [&](std::string name, const ValueAtVisit& value) -> Driver& {
     return drivers.emplace_back(Driver{std::move(name), "", for_all_axes(log, value)});
   };
-  add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; }).reference = 0;
+  Driver& clock = add("t_s", [&](std::size_t k) { return visits[k].t_mean_s; });
+  clock.reference = 0;
+  for (const Visit& visit : visits) clock.dwell_s.push_back(visit.duration_s());
   add("delta_deg", [&](std::size_t k) { return visits[k].delta_rad; }).angle = true;
   add("h_deg", [&](std::size_t k) { return visits[k].h_rad; });
   for (std::size_t i = 0; i < kAxisCount; ++i) {
@@ -231,6 +233,10 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
     for (double& value : of_axis) value = std::abs(value);
   const auto size_rad =
       for_all_axes(log, [&](std::size_t k) { return std::abs(turn_rad(log, k)); });
+  const auto size_of_h_rad = for_all_axes(log, [&](std::size_t k) {
+    const Visit* before = log.before(k);
+    return before ? std::abs(log.visits[k].h_rad - before->h_rad) : 0;
+  });
   const auto way_s = for_all_axes(log, [&](std::size_t k) {
     const Visit* before = log.before(k);
     return before ? log.visits[k].t_arrival_s - before->t_arrival_s - before->duration_s() : 0;
@@ -238,6 +244,7 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   std::vector<Driver> drivers = {
       {"previous_pose", "size of the change of a_i since", std::move(size_g)},
       {"previous_pose", "size of the turn of delta since", size_rad},
+      {"previous_pose", "size of the change of h since", size_of_h_rad},
       {"previous_pose", "time on the way", way_s}};
   for (Driver& driver : drivers) driver.span = about_zero(driver.value);
   return drivers;

@@ -30,7 +30,8 @@ struct Driver {
   /// the reference temperature, the mean of any other column, the start, a rate, a change or a
   /// component of zero. A matter of the driver, not of the visits: a model is read back for others.
   std::optional<double> reference = {};
-  double scatter = 0;  ///< of single readings about the value that stands for a dwell
+  double scatter = 0;                ///< of single readings about the value that stands for a dwell
+  std::vector<double> dwell_s = {};  ///< of a clock: how long each visit lasts
   /// The visit to which the head came from where nothing recorded says; 0 where that is the first.
   std::size_t begins_anew = 0;
   /// Of `value`: "rad", "s", "g", that in which a column's name ends ("V" of supply_V, K above the
@@ -60,7 +61,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 /// the previous pose, under the name of what came before.
 std::vector<Driver> changes_of_others(const VisitLog& log);
 
-/// How far the component of the own axis and δ went on the way from the previous pose, whichever
+/// How far the component of the own axis, δ and h went on the way from the previous pose, whichever
 /// way, and how long that took, under the name of what came before.
 std::vector<Driver> sizes_of_changes(const VisitLog& log);
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <map>
 #include <utility>
 
@@ -11,15 +10,27 @@ namespace {
 
 /// What a course is multiplied with at a visit.
 double factor_of(CourseOf of, const TermInput& input) {
+  const Visit* before = input.log.before(input.visit);
+  const auto step_g = [&](std::size_t next) {
+    const auto axis = static_cast<Eigen::Index>((input.axis + next) % kAxisCount);
+    return before == nullptr ? 0 : input.a_g[input.visit - 1](axis) - input.a_g[input.visit](axis);
+  };
   switch (of) {
     case CourseOf::one:
       break;
     case CourseOf::component:
       return input.a();
-    case CourseOf::step: {
-      if (input.log.before(input.visit) == nullptr) return 0;
-      return input.a_g[input.visit - 1](static_cast<Eigen::Index>(input.axis)) - input.a();
-    }
+    case CourseOf::step:
+      return step_g(0);
+    case CourseOf::step_of_next:
+      return step_g(1);
+    case CourseOf::step_after_next:
+      return step_g(2);
+    case CourseOf::turn_of_delta:
+      if (before == nullptr) return 0;
+      return std::abs(std::remainder(input.at().delta_rad - before->delta_rad, effect::kTurn_rad));
+    case CourseOf::turn_of_h:
+      return before == nullptr ? 0 : std::abs(input.at().h_rad - before->h_rad);
   }
   return 1;
 }
@@ -31,6 +42,14 @@ const char* words_of(CourseOf of) {
       return ", times a_i";
     case CourseOf::step:
       return ", times the change of a_i on the way";
+    case CourseOf::step_of_next:
+      return ", times the change of the component of the next axis on the way";
+    case CourseOf::step_after_next:
+      return ", times the change of the component of the axis after the next on the way";
+    case CourseOf::turn_of_delta:
+      return ", times the turn of delta on the way";
+    case CourseOf::turn_of_h:
+      return ", times the change of h on the way";
   }
   return "";
 }
@@ -44,7 +63,7 @@ class WithinDwell : public SmoothTerm {
   const std::string& driver() const override { return driver_; }
   TermForm form() const override { return TermForm::sample; }
   Subject subject() const override { return Subject::sensor; }
-  bool remembers() const override { return of_ == CourseOf::step; }
+  bool remembers() const override { return of_ != CourseOf::one && of_ != CourseOf::component; }
   bool guesses_at_start() const override { return remembers(); }
   bool within_dwell() const override { return true; }
 
@@ -114,42 +133,42 @@ class RingDown final : public WithinDwell {
             {"s", unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    constexpr double kLeastPeriods = 1, kMostOfRate = 0.4;
-    constexpr std::size_t kFewestSamples = 16;
-    const Visit& visit = log.visits.front();
-    const double dwell_s = visit.duration_s();
+    std::vector<Hypothesis> starts = effect::starts_of_ringing(log.visits.front());
+    for (Hypothesis& start : starts) start.p[2] = start.p[3] = effect::kSmallTerm;
+    return starts;
+  }
+  double term_g(const TermInput& input, const double* p) const override {
+    return factor_of(of(), input) * effect::mean_of_ringing(input.at(), p);
+  }
+  Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
+    return factor_of(of(), input) * effect::ringing(input.at(), p);
+  }
+};
+
+class DecayInDwell final : public WithinDwell {
+ public:
+  using WithinDwell::WithinDwell;
+
+  std::string shape() const override {
+    return std::string("exponential after arrival") + words_of(of());
+  }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"tau", "s", ParameterRole::shape}, {"c", unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    const double dwell_s = log.visits.front().duration_s();
     std::vector<Hypothesis> starts;
-    if (!(dwell_s > 0) || visit.count < kFewestSamples) return starts;
-    for (const double f_hz :
-         effect::geometric(kLeastPeriods / dwell_s, kMostOfRate / visit.step_s, 8))
-      for (const double part : {0.1, 0.4})
-        starts.push_back({{f_hz, part * dwell_s, effect::kSmallTerm, effect::kSmallTerm}});
+    if (!(dwell_s > 0)) return starts;
+    for (const double tau_s : effect::geometric(dwell_s / 10, dwell_s * 2, 5))
+      starts.push_back({{tau_s, effect::kSmallTerm}});
     return starts;
   }
   double term_g(const TermInput& input, const double* p) const override {
     const Visit& visit = input.at();
-    const std::complex<double> turn = turn_of_sample(visit, p);
-    const auto n = static_cast<double>(visit.count);
-    const std::complex<double> mean = (1.0 - std::pow(turn, n)) / (1.0 - turn) / n;
-    return factor_of(of(), input) * (p[2] * mean.real() + p[3] * mean.imag());
+    return factor_of(of(), input) * p[1] * effect::mean_decay(visit, visit.t_arrival_s, p[0]);
   }
   Eigen::VectorXd course_g(const TermInput& input, const double* p) const override {
-    return factor_of(of(), input) * course(input.at(), p);
-  }
-
- private:
-  static std::complex<double> turn_of_sample(const Visit& visit, const double* p) {
-    return std::exp(visit.step_s * std::complex<double>(-1 / p[1], effect::kTurn_rad * p[0]));
-  }
-  static Eigen::VectorXd course(const Visit& visit, const double* p) {
-    const std::complex<double> turn = turn_of_sample(visit, p);
-    std::complex<double> now = 1;
-    Eigen::VectorXd values(static_cast<Eigen::Index>(visit.count));
-    for (double& value : values) {
-      value = p[2] * now.real() + p[3] * now.imag();
-      now *= turn;
-    }
-    return values;
+    return factor_of(of(), input) * p[1] * effect::decay_since_arrival(input.at(), p[0]).matrix();
   }
 };
 
@@ -201,6 +220,10 @@ std::unique_ptr<SmoothTerm> event_of_dwells(EventShape shape) {
 }
 
 std::unique_ptr<SmoothTerm> ring_down(CourseOf of) { return std::make_unique<RingDown>(of); }
+
+std::unique_ptr<SmoothTerm> decay_in_dwell(CourseOf of) {
+  return std::make_unique<DecayInDwell>(of);
+}
 
 std::unique_ptr<SmoothTerm> dwell_course(const VisitLog& log, CourseOf of, int degree) {
   return std::make_unique<DwellCourse>(log, of, degree);

@@ -35,6 +35,43 @@ double share_below(double edge, double value, double sd) {
 }
 
 // Over a run of hours the phase at its end must change by little only.
+namespace {
+
+std::complex<double> turn_of_sample(const Visit& visit, const double* p) {
+  return std::exp(visit.step_s * std::complex<double>(-1 / p[1], kTurn_rad * p[0]));
+}
+
+}  // namespace
+
+Eigen::VectorXd ringing(const Visit& visit, const double* p) {
+  const std::complex<double> turn = turn_of_sample(visit, p);
+  std::complex<double> now = 1;
+  Eigen::VectorXd values(static_cast<Eigen::Index>(visit.count));
+  for (double& value : values) {
+    value = p[2] * now.real() + p[3] * now.imag();
+    now *= turn;
+  }
+  return values;
+}
+
+double mean_of_ringing(const Visit& visit, const double* p) {
+  const std::complex<double> turn = turn_of_sample(visit, p);
+  const auto n = static_cast<double>(visit.count);
+  const std::complex<double> mean = (1.0 - std::pow(turn, n)) / (1.0 - turn) / n;
+  return p[2] * mean.real() + p[3] * mean.imag();
+}
+
+std::vector<Hypothesis> starts_of_ringing(const Visit& visit) {
+  constexpr double kLeastPeriods = 1, kMostOfRate = 0.4;
+  constexpr std::size_t kFewestSamples = 16;
+  const double dwell_s = visit.duration_s();
+  std::vector<Hypothesis> starts;
+  if (!(dwell_s > 0) || visit.count < kFewestSamples) return starts;
+  for (const double f_hz : geometric(kLeastPeriods / dwell_s, kMostOfRate / visit.step_s, 8))
+    for (const double part : {0.1, 0.4}) starts.push_back({{f_hz, part * dwell_s, 1, 1}});
+  return starts;
+}
+
 ParameterInfo line_frequency() { return {"f", "Hz", ParameterRole::shape, 1e-7}; }
 ParameterInfo line_phase() { return {"phase", "deg", ParameterRole::shape, 1e-2}; }
 

@@ -213,6 +213,12 @@ Eigen::ArrayXd since_arrival_s(const Visit& visit);
 Eigen::ArrayXd decay_since_arrival(const Visit& visit, double tau_s);
 /// Mean over the dwell of exp(−(t − origin)/τ), in closed form for even spacing.
 double mean_decay(const Visit& visit, double origin_s, double tau_s);
+/// What an arrival sets off and what dies away, exp(−t/τ)·(c·cos 2πft + s·sin 2πft), t since
+/// arrival, p = f, τ, c, s: at every sample, and the mean over the dwell.
+Eigen::VectorXd ringing(const Visit& visit, const double* p);
+double mean_of_ringing(const Visit& visit, const double* p);
+/// Where a search of it starts, of size 1; none for a dwell that does not show it.
+std::vector<Hypothesis> starts_of_ringing(const Visit& visit);
 /// Frequency and phase of a line, sin(2π·f·t + phase), t on the clock of the run.
 ParameterInfo line_frequency();
 ParameterInfo line_phase();

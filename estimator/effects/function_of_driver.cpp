@@ -261,6 +261,35 @@ class Wave final : public DrivenTerm {
   double shortest_;
 };
 
+class DyingWave final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"start", "s", ParameterRole::index},
+            {"period", "s", ParameterRole::shape},
+            {"tau", "s", ParameterRole::shape},
+            {"c", target().unit(), ParameterRole::amplitude},
+            {"s", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    const auto [low, high] = range();
+    const double span_s = high - low, size = target().typical_size();
+    std::vector<Hypothesis> starts;
+    for (const double cycles : effect::geometric(2, 16, 14))
+      for (const double share : {0.08, 0.25})
+        starts.push_back({{low, span_s / cycles, share * span_s, size, size}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "wave that dies away"; }
+  double at(double t_s, const double* p) const override {
+    const double phase = 2 * std::numbers::pi * (t_s - p[0]) / p[1];
+    return std::exp((p[0] - t_s) / p[2]) * (p[3] * std::cos(phase) + p[4] * std::sin(phase));
+  }
+};
+
 class Decay final : public DrivenTerm {
  public:
   using DrivenTerm::DrivenTerm;
@@ -342,7 +371,9 @@ std::string Target::words() const {
     const char* const grows = pull == Pull::cosine_of_h ? ", times the cosine of h"
                               : pull == Pull::sine_of_h ? ", times the sine of h"
                                                         : "";
-    const char* const to = any_direction                      ? ", added to the tilt of the base"
+    const bool in_seat = angle == &HeadGeometry::seat_y_rad;
+    const char* const to = in_seat         ? ", added to the tilt of the triad in its seat"
+                           : any_direction ? ", added to the tilt of the base"
                            : angle == &HeadGeometry::h_rad    ? ", added to h"
                            : angle == &HeadGeometry::roll_rad ? ", added to the base roll"
                            : angle == &HeadGeometry::skew_rad ? ", added to the skew of the spindle"
@@ -357,7 +388,8 @@ std::string Target::words() const {
 }
 
 bool Target::mean_in_the_twelve() const {
-  return form == TermForm::geometry ? angle == &HeadGeometry::delta_rad : !second;
+  if (form != TermForm::geometry) return !second;
+  return angle == &HeadGeometry::delta_rad || angle == &HeadGeometry::seat_y_rad;
 }
 
 const char* Target::unit() const {
@@ -436,6 +468,9 @@ std::unique_ptr<SmoothTerm> wave(DriverPointer driver, const Target& target, con
   return std::make_unique<Wave>(std::move(driver), target, cycles, shortest);
 }
 bool is_wave(const Effect& effect) { return dynamic_cast<const Wave*>(&effect) != nullptr; }
+std::unique_ptr<SmoothTerm> dying_wave(DriverPointer clock, const Target& target) {
+  return std::make_unique<DyingWave>(std::move(clock), target);
+}
 std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target) {
   return std::make_unique<Decay>(std::move(clock), target);
 }

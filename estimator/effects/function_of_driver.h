@@ -22,7 +22,7 @@ struct Target {
   std::size_t other = 0;
   std::optional<std::size_t> second = {};
   Pull pull = Pull::none;      ///< geometry
-  bool any_direction = false;  ///< geometry: of h, for towards_a_direction()
+  bool any_direction = false;  ///< geometry: for towards_a_direction()
 
   std::string words() const;
   /// Whether what is added to all visits alike is what the 12 parameters describe.
@@ -35,13 +35,16 @@ struct Target {
   double factor_at(const Visit& visit) const;
 };
 
-/// The angles of head and base; the tilt of the base is for towards_a_direction().
+/// The angles of head and base; the tilts of the base and of the triad in its seat are for
+/// towards_a_direction().
 inline constexpr Target kDelta{.form = TermForm::geometry};
 inline constexpr Target kH{.form = TermForm::geometry, .angle = &HeadGeometry::h_rad};
 inline constexpr Target kRoll{.form = TermForm::geometry, .angle = &HeadGeometry::roll_rad};
 inline constexpr Target kSkew{.form = TermForm::geometry, .angle = &HeadGeometry::skew_rad};
 inline constexpr Target kTilt{
     .form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
+inline constexpr Target kSeat{
+    .form = TermForm::geometry, .angle = &HeadGeometry::seat_y_rad, .any_direction = true};
 
 /// Σ c_d·P_d, d = 1 … degree, of the range from low to high. Beyond it degree 1 goes straight on,
 /// degree 2 as a parabola as far as `curved`, in half-ranges, and then straight on; higher degrees
@@ -79,10 +82,18 @@ std::unique_ptr<SmoothTerm> one_position(DriverPointer angle, const Target& targ
 /// A bell of unknown middle and width: something that happened once and took a while, or one place
 /// of an angle.
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
+/// What passes through a resonance: as 1/(1 + x²) about an unknown value.
+std::unique_ptr<SmoothTerm> resonance(DriverPointer driver, const Target& target);
+/// To one side and to the other of an unknown value, over an unknown width (the slope of a bell): a
+/// seam between two segments of a characteristic.
+std::unique_ptr<SmoothTerm> seam(DriverPointer driver, const Target& target);
 /// The same between two unknown values of an angle and nothing elsewhere.
 std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target);
-/// The same between two unknown times.
+/// The same between two unknown times, at once or with soft edges; of a dwell in which it begins or
+/// ends it is there for a part.
 std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target);
+/// A wave that dies away with the time, from the first pose on.
+std::unique_ptr<SmoothTerm> dying_wave(DriverPointer clock, const Target& target);
 /// There at once from an unknown time on, then it dies away by an unknown time constant, no longer
 /// than `longest_s`: what lasts is a step.
 std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target, double longest_s);
@@ -96,6 +107,10 @@ bool is_saw_tooth(const Effect& effect);
 /// Nothing on one side of an unknown value, proportional to the distance from it on the other; of a
 /// component of the specific force also nothing up to an unknown size on both sides.
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
+/// There where one bit of the code is set, `adc` saying how large bits are; without it none are
+/// looked for.
+std::unique_ptr<SmoothTerm> bit_of_code(DriverPointer code, const Target& target,
+                                        const std::optional<Adc>& adc);
 /// How a step is searched for; once found, both say the same.
 enum class StepEdge { sharp, gradual };
 /// Nothing on one side of an unknown value, an unknown power of the distance from it on the other.

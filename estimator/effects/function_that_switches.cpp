@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -95,6 +96,7 @@ class Window final : public DrivenTerm {
     // Between two visits nothing moves a sharp edge.
     return {effect::instant("from"),
             effect::instant("to"),
+            {"edge", "s", ParameterRole::index},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   /// Few where two steps that cancel, or a train, lead to all others.
@@ -103,7 +105,7 @@ class Window final : public DrivenTerm {
     std::vector<Hypothesis> starts;
     const auto add_all = [&](double width, double spacing) {
       for (double from = low; from + width < high; from += spacing)
-        starts.push_back(half_way(from, from + width, target().typical_size()));
+        starts.push_back(half_way(from, from + width, 0, target().typical_size()));
     };
     const double span = high - low;
     if (target().form == TermForm::bias)
@@ -119,7 +121,7 @@ class Window final : public DrivenTerm {
     std::vector<Hypothesis> others;
     const auto add_moved = [&](double from, double to) {
       if (from > range().first && to < range().second && from < to)
-        others.push_back(half_way(from, to, found.p[2]));
+        others.push_back(half_way(from, to, found.p[2], found.p[3]));
     };
     for (const int visits : {1, 2, 4, 8, 16, 32, 64})
       for (const double move : {-spacing * visits, spacing * visits}) {
@@ -127,31 +129,78 @@ class Window final : public DrivenTerm {
         add_moved(found.p[0], found.p[1] + move);
         add_moved(found.p[0] + move, found.p[1] + move);
       }
+    // An edge within the dwell before or after it.
+    for (const double from_s : within_dwells_near(found.p[0]))
+      others.push_back({{from_s, found.p[1], 0, found.p[3]}});
+    for (const double to_s : within_dwells_near(found.p[1]))
+      others.push_back({{found.p[0], to_s, 0, found.p[3]}});
+    // Or none that is sharp.
+    for (const double visits : {0.5, 1.0, 2.0, 4.0})
+      others.push_back({{found.p[0], found.p[1], visits * spacing, found.p[3]}});
     return others;
   }
   /// A step and one back, or a train of which the run saw one pulse.
-  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
-                                 const std::vector<std::vector<double>>& steps) const override {
+  std::vector<Hypothesis> in_one(const VisitLog& log, std::size_t axis, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& found) const override {
     if (dynamic_cast<const Pulses*>(&repeated) != nullptr && repeated.id() == id()) {
-      const std::vector<double>& train = steps.front();
-      return {half_way(train[3] - 0.5 * train[2], train[3] + 0.5 * train[2], train[4])};
+      const std::vector<double>& train = found.front();
+      const double from_s = train[3] - 0.5 * train[2], to_s = train[3] + 0.5 * train[2];
+      return at_edges_near(from_s, to_s, train[4]);
     }
-    if (repeated.id() != "sensor.bias_step" || target().form != TermForm::bias || steps.size() != 2)
-      return {};
-    const bool in_order = steps[0][1] < steps[1][1];
-    const std::vector<double>&first = steps[in_order ? 0 : 1], &second = steps[in_order ? 1 : 0];
-    if (!(first[0] * second[0] < 0)) return {};
-    return {half_way(first[1], second[1], first[0])};
+    if (found.size() != 2) return DrivenTerm::in_one(log, axis, repeated, found);
+    const auto there_and_back = [&](std::size_t time, std::size_t size) -> std::vector<Hypothesis> {
+      const bool in_order = found[0][time] < found[1][time];
+      const auto &first = found[in_order ? 0 : 1], &second = found[in_order ? 1 : 0];
+      if (!(first[size] * second[size] < 0)) return {};
+      return at_edges_near(first[time], second[time], first[size]);
+    };
+    if (repeated.id() == "sensor.bias_step" && target().form == TermForm::bias)
+      return there_and_back(1, 0);
+    const auto* steps = dynamic_cast<const SmoothTerm*>(&repeated);
+    if (steps != nullptr && steps->is(driver(), to_string(form()), "step" + target().words()))
+      return there_and_back(0, 2);
+    return {};
   }
 
  private:
   std::string function() const override { return "window"; }
-  double at(double value, const double* p) const override {
-    return value > p[0] && value < p[1] ? p[2] : 0;
+  /// Of a dwell in which an edge lies it is there for a part.
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double middle_s = variable().value[axis][visit];
+    if (p[2] > 0) {
+      const double begun = 1 / (1 + std::exp((p[0] - middle_s) / p[2]));
+      const double ended = 1 / (1 + std::exp((p[1] - middle_s) / p[2]));
+      return p[3] * (begun - ended);
+    }
+    const double half_s = 0.5 * variable().dwell_s[visit];
+    if (!(half_s > 0)) return middle_s > p[0] && middle_s < p[1] ? p[3] : 0;
+    const double there_s = std::min(middle_s + half_s, p[1]) - std::max(middle_s - half_s, p[0]);
+    return p[3] * std::clamp(there_s / (2 * half_s), 0.0, 1.0);
+  }
+  std::vector<double> within_dwells_near(double t_s) const {
+    const std::vector<double>& middles_s = variable().value[0];
+    const auto after = static_cast<std::size_t>(
+        std::lower_bound(middles_s.begin(), middles_s.end(), t_s) - middles_s.begin());
+    std::vector<double> places;
+    for (std::size_t visit = std::max<std::size_t>(after, 1) - 1;
+         visit < std::min(after + 1, middles_s.size()); ++visit)
+      for (const double share : {-0.36, -0.12, 0.12, 0.36})
+        places.push_back(middles_s[visit] + share * variable().dwell_s[visit]);
+    return places;
   }
   /// Edges half way between the visits that these times lie between.
-  Hypothesis half_way(double from, double to, double size) const {
-    return {{half_way_between_visits(from), half_way_between_visits(to), size}};
+  Hypothesis half_way(double from, double to, double edge_s, double size) const {
+    return {{half_way_between_visits(from), half_way_between_visits(to), edge_s, size}};
+  }
+  /// The same, and those within the dwells.
+  std::vector<Hypothesis> at_edges_near(double from, double to, double size) const {
+    std::vector<double> froms_s = within_dwells_near(from), tos_s = within_dwells_near(to);
+    froms_s.push_back(half_way_between_visits(from));
+    tos_s.push_back(half_way_between_visits(to));
+    std::vector<Hypothesis> found;
+    for (const double from_s : froms_s)
+      for (const double to_s : tos_s) found.push_back({{from_s, to_s, 0, size}});
+    return found;
   }
 };
 
@@ -311,10 +360,61 @@ class SawTooth final : public DrivenTerm {
   }
 };
 
+/// What shows whether a bit of a code is set: its weight is wrong, or it is felt elsewhere.
+class BitOfCode final : public DrivenTerm {
+ public:
+  BitOfCode(DriverPointer code, Target target, std::optional<Adc> adc)
+      : DrivenTerm(std::move(code), target), adc_(adc) {}
+
+  /// Another axis does not see the component that stands for the code.
+  bool acts_on(std::size_t) const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", "V", ParameterRole::index},
+            {"size", "V", ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    std::vector<Hypothesis> starts;
+    if (!adc_) return starts;
+    const auto [low, high] = range();
+    for (int bit = 0; bit < adc_->bits; ++bit) {
+      const double size_V = std::ldexp(adc_->lsb_V(), bit);
+      // It is set and not set again, and noise does not hide which.
+      if (size_V > kHidden * variable().scatter && size_V < 0.5 * (high - low))
+        starts.push_back({{adc_->min_V - 0.5 * adc_->lsb_V(), size_V, target().typical_size()}});
+    }
+    return starts;
+  }
+
+ private:
+  static constexpr double kHidden = 0.7;
+
+  std::string function() const override { return "bit of the code"; }
+  double at(double value, const double* p) const override {
+    const double x = (value - p[0]) / p[1], sd = variable().scatter / p[1];
+    const double first = std::floor(x - effect::kReach * sd);
+    const int steps = effect::whole_numbers(first, x + effect::kReach * sd);
+    double set = 0;
+    for (int k = 0; k < steps; ++k) {
+      const double from = first + k;
+      if (std::fmod(std::abs(from), 2) == 1)
+        set += effect::share_below(from + 1, x, sd) - effect::share_below(from, x, sd);
+    }
+    return p[2] * set;
+  }
+
+  std::optional<Adc> adc_;
+};
+
 }  // namespace
 
 std::unique_ptr<SmoothTerm> window(DriverPointer clock, const Target& target) {
   return std::make_unique<Window>(std::move(clock), target);
+}
+
+std::unique_ptr<SmoothTerm> bit_of_code(DriverPointer code, const Target& target,
+                                        const std::optional<Adc>& adc) {
+  return std::make_unique<BitOfCode>(std::move(code), target, adc);
 }
 
 std::unique_ptr<SmoothTerm> relaxation(DriverPointer clock, const Target& target,

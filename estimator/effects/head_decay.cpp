@@ -84,7 +84,47 @@ class HeadDecay final : public SmoothTerm {
   std::string driver_ = "t_in_pose";
 };
 
+class HeadRinging final : public SmoothTerm {
+ public:
+  explicit HeadRinging(double HeadGeometry::*angle) : angle_(angle) {}
+
+  std::string id() const override { return "unlisted:t_in_pose:geometry"; }
+  const std::string& driver() const override { return driver_; }
+  TermForm form() const override { return TermForm::geometry; }
+  std::string shape() const override {
+    return "ringing that dies away" + Target{.form = TermForm::geometry, .angle = angle_}.words();
+  }
+  Subject subject() const override { return Subject::head; }
+  bool within_dwell() const override { return true; }
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"f", "Hz", ParameterRole::shape},
+            {"tau", "s", ParameterRole::shape},
+            {"c", "deg", ParameterRole::amplitude},
+            {"s", "deg", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    std::vector<Hypothesis> starts = effect::starts_of_ringing(log.visits.front());
+    for (Hypothesis& start : starts) start.p[2] = start.p[3] = effect::kSmallAngle_deg;
+    return starts;
+  }
+  void displace(const VisitLog& log, std::size_t visit, const double* p,
+                HeadGeometry& head) const override {
+    head.*angle_ += effect::mean_of_ringing(log.visits[visit], p) * kRadPerDeg;
+  }
+  AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
+    return {angle_, effect::ringing(log.visits[visit], p) * kRadPerDeg};
+  }
+
+ private:
+  double HeadGeometry::*angle_;
+  std::string driver_ = "t_in_pose";
+};
+
 }  // namespace
+
+std::unique_ptr<SmoothTerm> head_ringing(double HeadGeometry::*angle) {
+  return std::make_unique<HeadRinging>(angle);
+}
 
 std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, DecayOf of) {
   return std::make_unique<HeadDecay>(angle, of);

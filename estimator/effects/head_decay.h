@@ -15,4 +15,7 @@ enum class DecayOf { one, weight, way };
 /// the way that this angle has just turned.
 std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, DecayOf of);
 
+/// A sine that every arrival sets off in δ or h and that dies away (effect::ringing()).
+std::unique_ptr<SmoothTerm> head_ringing(double HeadGeometry::*angle);
+
 }  // namespace plumbline

@@ -70,6 +70,12 @@ std::array<Target, 2> pulled(const Target& angle) {
   return {by_cosine, by_sine};
 }
 
+/// How far the values that a driver takes lie apart, as if evenly.
+double spacing_of(const Driver& driver) {
+  const auto [low, high] = std::minmax_element(driver.value[0].begin(), driver.value[0].end());
+  return (*high - *low) / std::max<double>(1, static_cast<double>(driver.fewest_values) - 1);
+}
+
 /// The terms of a log, gathered driver by driver.
 class TermList {
  public:
@@ -83,7 +89,9 @@ class TermList {
     for_each(loads_of_others(log_),
              [&](const DriverPointer& driver) { add(friction(driver, kBias)); });
     for_each(changes_of_others(log_), add_line);
-    for_each(sizes_of_changes(log_), add_line);
+    for_each(sizes_of_changes(log_), [&](const DriverPointer& driver) {
+      for (const Target& target : {kBias, kDelta, kH}) add_polynomials(driver, target, {1});
+    });
     for_each({component_before(log_)},
              [&](const DriverPointer& driver) { add_polynomials(driver, kScale, {1}); });
     add_of_wound_up_spindle();
@@ -102,10 +110,16 @@ class TermList {
     for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
       for (const int degree : {1, 2, 3}) add(dwell_course(log_, of, degree));
     for (const CourseOf of : {CourseOf::one, CourseOf::step}) add(ring_down(of));
+    // Of the step of the axis itself it is a listed effect.
+    for (const CourseOf of : {CourseOf::one, CourseOf::step_of_next, CourseOf::step_after_next,
+                              CourseOf::turn_of_delta, CourseOf::turn_of_h})
+      add(decay_in_dwell(of));
     for (const EventShape shape : {EventShape::step, EventShape::window})
       add(event_of_dwells(shape));
-    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
+    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
       add(swinging_angle(angle));
+      add(head_ringing(angle));
+    }
     for (const DriverPointer& column : columns_) add(line_of_column(column));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
       for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
@@ -149,6 +163,7 @@ class TermList {
       for (const Target& target : {kBias, kScale, kH}) add_polynomials(driver, target, {1});
       // A play that the load takes up, which turns with the tilt.
       for (const Target& target : pulled(kDelta)) add_polynomials(driver, target, {1});
+      directions_.push_back(driver);
       return;
     }
     for (const Target& target : {kBias, kScale, kDelta, kH}) {
@@ -166,6 +181,7 @@ class TermList {
           add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add_polynomials(driver, kRoll, {1, 2, 3});
       for (const int degree : {1, 2, 3}) add_tilt(polynomial(driver, kTilt, degree));
+      for (const int degree : {1, 2}) add_tilt(polynomial(driver, kSeat, degree));
       add_polynomials(driver, kSkew, {1, 2});
     }
     if (clock || column)
@@ -184,6 +200,8 @@ class TermList {
     for (const Target& target : {kBias, kScale})
       for (const OfPlay of : {OfPlay::lag, OfPlay::follower}) add(play(driver, target, of));
     add(power_beyond(driver, kBias));
+    add(bell(driver, kBias));
+    add(resonance(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 10}));
     add(saw_tooth(driver, kBias));  // a compensation that goes by steps
   }
@@ -193,7 +211,12 @@ class TermList {
   }
   void add_of_clock(const DriverPointer& clock) {
     add(bell(clock, kBias));
-    for (const Target& target : {kBias, kScale}) add(window(clock, target));
+    for (const Target& target : {kBias, kScale, kDelta, kH, kRoll}) add(window(clock, target));
+    for (std::size_t other = 1; other < kAxisCount; ++other)
+      add(window(clock, {.form = TermForm::scale, .other = other}));
+    add_tilt(window(clock, kTilt));
+    add_tilt(step(clock, kSeat, StepEdge::sharp));
+    add(dying_wave(clock, kBias));
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));
     for (const Target& target : {kBias, kScale}) {
@@ -228,7 +251,8 @@ class TermList {
     for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     add(gain_beyond(driver, kBias));
     add_steps(driver, kBias);
-    add(bell(driver, kBias));
+    add_tilt(step(driver, kSeat, StepEdge::sharp));  // a block that rocks
+    for (const auto& shape : {bell, seam}) add(shape(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 20}));
     add(saw_tooth(driver, kBias));
     // What is no shape of its own.
@@ -249,8 +273,9 @@ class TermList {
     const auto [low, high] = std::minmax_element(h->value[0].begin(), h->value[0].end());
     const double turns = h->varies() ? (*high - *low) / effect::kTurn_rad : 1;
     for (const Target& target : {kBias, kH, kDelta, kRoll})
-      add(wave(h, target, {2 * turns, turns, 8 * turns}));
+      add(wave(h, target, {2 * turns, turns, 18 * turns}, 2 * spacing_of(*h)));
     add_polynomials(h, kRoll, {1, 2, 3, 5});
+    add(bell(h, kBias));
     add_steps(h, kRoll);
     for (const Target& target : {kDelta, kH}) {
       add(one_position(h, target));
@@ -282,6 +307,10 @@ class TermList {
         add(line_times_harmonic(driver, angle, kBias));
         add(line_times_harmonic(driver, angle, angle->angle ? kDelta : kH));
       }
+    // A play that the load takes up, which turns with the spindle.
+    for (const DriverPointer& direction : directions_)
+      if (!angles_.empty() && angles_[0]->angle)
+        add(line_times_harmonic(direction, angles_[0], kDelta));
     // What the weight does to a wheel grows with its moment about the axis, which need be no line.
     if (angles_.size() == 2) add(parabola_times_harmonic(angles_[1], angles_[0], kDelta));
     for (std::size_t one = 0; one < columns_.size(); ++one)
@@ -295,6 +324,7 @@ class TermList {
       add_polynomials(turn, target, {1, 2, 3});
     for (const Target& target : {kDelta, kH, kSkew}) add(wave(turn, target, {0.2, 0.2, 6}));
     add(saw_tooth(turn, kDelta));
+    add(relay(turn, kBias));
   }
   void add_of_code(const DriverPointer& code) {
     // What repeats from step to step, or every second step, is the rounding itself, or a bit.
@@ -303,13 +333,16 @@ class TermList {
     add_polynomials(code, kBias, {2, 3, 5});
     add(bend(code, kBias));
     add_steps(code, kBias);
+    add(seam(code, kBias));
+    add(bit_of_code(code, kBias, log_.adc));
     add(saw_tooth(code, kBias));
   }
 
   const VisitLog& log_;
   bool any_;
-  std::vector<DriverPointer> columns_;  ///< recorded, but for their rates
-  std::vector<DriverPointer> angles_;   ///< delta, then h
+  std::vector<DriverPointer> columns_;     ///< recorded, but for their rates
+  std::vector<DriverPointer> angles_;      ///< delta, then h
+  std::vector<DriverPointer> directions_;  ///< two-valued
   DriverPointer clock_;
   std::vector<std::unique_ptr<SmoothTerm>> terms_;
 };

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -58,6 +59,28 @@ TEST(Structure, AMachineThatRunsNowAndThenIsALineOfItsColumn) {
   };
   expect_only_structure(with_column(options, "compressor_on", runs),
                         {"compressor_on", "sample", "straight line, times a sine"});
+}
+
+// As ringing and a polynomial of the change of h.
+TEST(Structure, WhatALongMoveHeatsCoolsDownInTheDwell) {
+  SyntheticOptions options = long_dwells();
+  options.random_order = true;
+  options.more_V[0] = [pose = -1.0, h_rad = 0.0, way_rad = 0.0](const auto& a_g,
+                                                                double t_s) mutable {
+    const double since_s = since_arrival_s(t_s + 1e-9);
+    if (since_s < 0) return 0.0;
+    if (const double now = std::round((t_s - since_s) / 3); now != pose) {
+      pose = now;
+      const double to_rad = std::asin(std::clamp(a_g[2] / 1.0004, -1.0, 1.0));
+      way_rad = std::abs(to_rad - h_rad);
+      h_rad = to_rad;
+    }
+    return 1e-3 * way_rad * std::exp(-since_s / 0.15);
+  };
+  const UnlistedStructure found = expect_only_structure(
+      options,
+      {"t_in_pose", "sample", "exponential after arrival, times the change of h on the way"});
+  EXPECT_NEAR(found.parameters[0].value, 0.15, 0.05);
 }
 
 }  // namespace

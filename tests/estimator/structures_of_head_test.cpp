@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "tests/estimator/structure.h"
 
@@ -125,6 +126,81 @@ TEST(Structure, AServoThatHuntsSwingsTheSpindle) {
   const EffectParameter &size = parameter(found, "amplitude"), &f = parameter(found, "f");
   EXPECT_NEAR(size.value, kSwing_rad / kRadians, std::max(4 * size.u, 0.03 * size.value));
   EXPECT_NEAR(f.value, kFrequency_hz, 4 * f.u);
+}
+
+// As a change of the scale of two axes by the components of each other.
+TEST(Structure, ATriadThatTurnsInItsSeatIsOneOfTheHead) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  const auto warmth = [](double t_s) { return std::sin(t_s / 70) + 0.5 * std::sin(t_s / 23); };
+  const auto turn_rad = [=](double t_s) { return 0.01 * warmth(t_s); };
+  // Almost the sensitivities of the run.
+  options.more_V[0] = [=](const auto& a_g, double t_s) { return -0.032 * turn_rad(t_s) * a_g[2]; };
+  options.more_V[2] = [=](const auto& a_g, double t_s) { return -0.0328 * turn_rad(t_s) * a_g[0]; };
+  const UnlistedStructure found =
+      expect_only_structure(with_column(options, "block_K", warmth),
+                            {"block_K", "geometry",
+                             "polynomial of degree 1, added to the tilt of the triad in its seat"});
+  EXPECT_NEAR(parameter(found, "direction").value, 0, 3);  // about y
+}
+
+// As a step of h and a step back.
+TEST(Structure, ABaseThatStandsCrookedForAWhileIsAWindow) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.base_tilt_rad = [](double t_s) { return t_s > 200 && t_s < 320 ? 0.012 : 0; };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"t_s", "geometry", "window, added to h"});
+  for (const auto& p : found.parameters)
+    std::cerr << p.name << " " << p.value << " " << p.u << std::endl;
+  EXPECT_NEAR(parameter(found, "from").value, 200, 3);
+  EXPECT_NEAR(parameter(found, "to").value, 320, 3);
+}
+
+// In an order of visits that goes there and back it is a wave in time, too.
+TEST(Structure, APlayThatTheLoadTakesUpTurnsWithTheSpindle) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.delta_error_deg = [last_deg = 0.0, up = 1.0](double delta_deg, double) mutable {
+    if (delta_deg != last_deg) up = delta_deg > last_deg ? 1 : -1;
+    last_deg = delta_deg;
+    return 0.4 * up * std::sin(delta_deg * kRadians);
+  };
+  expect_only_structure(options, {"previous_pose", "geometry",
+                                  "straight line, times a harmonic of delta_deg in the direction "
+                                  "of the last turn of delta within 360 degrees, added to delta"});
+}
+
+// As polynomials of the change of h and of a_i.
+TEST(Structure, AnArmThatStaysWoundUpGoesByTheSizeOfItsLastMove) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.h_error_deg = [at_deg = std::pair(0.0, 0.0), size_deg = 0.0](double delta_deg,
+                                                                       double h_deg) mutable {
+    if (const auto now_deg = std::pair(delta_deg, h_deg); now_deg != at_deg) {
+      size_deg = std::abs(h_deg - at_deg.second);
+      at_deg = now_deg;
+    }
+    return 0.012 * size_deg;
+  };
+  expect_only_structure(
+      options, {"previous_pose", "geometry",
+                "polynomial of degree 1 in the size of the change of h since, added to h"});
+}
+
+// As courses of the dwell of all three axes.
+TEST(Structure, AnArmThatRingsAfterEveryMoveIsOne) {
+  SyntheticOptions options = fine_turns();
+  options.samples_per_pose = 40;
+  options.base_tilt_rad = [](double t_s) {
+    constexpr double kFirst_s = 61, kPose_s = 3;
+    if (t_s < kFirst_s) return 0.0;
+    const double since_s = std::fmod(t_s - kFirst_s + 1e-9, kPose_s);
+    return 0.02 * std::exp(-since_s / 0.1) * std::cos(2 * std::numbers::pi * 6 * since_s);
+  };
+  const UnlistedStructure found = expect_only_structure(
+      options, {"t_in_pose", "geometry", "ringing that dies away, added to h"});
+  EXPECT_NEAR(parameter(found, "f").value, 6, 0.3);
 }
 
 }  // namespace

@@ -242,5 +242,20 @@ TEST(Structure, WhatTheMotorsWarmOnTheWayGrowsWithItsTime) {
                         {"previous_pose", "bias", "polynomial of degree 1 in the time on the way"});
 }
 
+// As a train of pulses in time.
+TEST(Structure, ACableThatFlipsOverIsARelayOfTheTurn) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[0] = [flipped = false](const auto& a_g, double) mutable {
+    const double turn = std::atan2(-a_g[1], a_g[0]) / (2 * std::numbers::pi);
+    const double delta_deg = 360 * (turn - std::floor(turn));
+    if (delta_deg > 245) flipped = true;
+    if (delta_deg < 115) flipped = false;
+    return flipped ? 3e-4 : 0;
+  };
+  expect_only_structure(options, {"delta_deg", "bias", "relay in the angle that does not close"});
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -361,6 +362,88 @@ TEST(Structure, WhatLeaksBeyondSomeHumidityIsAPowerOfTheRest) {
   };
   expect_only_structure(with_column(options, "rh_pct", humidity),
                         {"rh_pct", "bias", "power beyond a value"});
+}
+
+// As two waves.
+TEST(Structure, AnOvenThatSettlesInSwingsIsAWaveThatDiesAway) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_V[1] = [](const auto&, double t_s) {
+    return 8e-4 * std::exp(-(t_s - 61) / 150) * std::cos((t_s - 61) / 14);
+  };
+  expect_only_structure(options, {"t_s", "bias", "wave that dies away"});
+}
+
+// As a bend and a polynomial.
+TEST(Structure, AFanThatPassesAResonanceIsOne) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  const auto rpm = [](double t_s) { return 2100 + 400 * std::sin(t_s / 37); };
+  options.more_V[0] = [=](const auto&, double t_s) {
+    const double x = (rpm(t_s) - 2180) / 60;
+    return 6e-4 / (1 + x * x);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(with_column(options, "fan_rpm", rpm), {"fan_rpm", "bias", "resonance"});
+  EXPECT_NEAR(found.parameters[0].value, 2180, 10);
+}
+
+// As a polynomial of degree 12 and a wave.
+TEST(Structure, ASeamBetweenTwoSegmentsIsOne) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[0] = [](const auto& a_g, double) {
+    const double x = (a_g[0] - 0.2) / 0.16;
+    return 5e-4 * x * std::exp(-0.5 * x * x);
+  };
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1)) << result.diagnosis.reason;
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty());
+  EXPECT_EQ(result.diagnosis.unlisted[0].shape, "seam");
+  EXPECT_THAT(result.diagnosis.unlisted[0].driver, AnyOf("a_x", "code_x"));
+}
+
+// As two waves and a polynomial of degree 8.
+TEST(Structure, ABitThatIsFeltOnAnotherAxisIsOne) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  SampleTable& samples = data.run.samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const auto code = std::lround((samples.u_V[0][k] - kSixteenBits.min_V) / kSixteenBits.lsb_V());
+    if ((code >> 8) % 2 == 1) samples.u_V[1][k] += 4 * kSixteenBits.lsb_V();
+  }
+  const UnlistedStructure found =
+      expect_only_structure(data, {"code_x", "bias", "bit of the code"});
+  EXPECT_EQ(found.axes, std::vector<std::size_t>{1});
+  EXPECT_NEAR(found.parameters[1].value, 256 * kSixteenBits.lsb_V(), 1e-12);
+}
+
+// As a step of the scale, and a window to the end of the run.
+TEST(Structure, WhatComesAndGoesGraduallyIsAWindowWithSoftEdges) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[2] = [](const auto& a_g, double t_s) {
+    return 6e-4 * (std::tanh((t_s - 200) / 25) - std::tanh((t_s - 420) / 25)) * a_g[0];
+  };
+  expect_only_structure(options, {"t_s", "scale", "window, times the component of the next axis"});
+}
+
+// What the cross axes add before it is clipped they add after.
+TEST(Structure, AStopOfTheComponentAloneIsSaturation) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_V[0] = [](const auto& a_g, double) {
+    return 0.032 * (std::clamp(a_g[0], -0.85, 0.85) - a_g[0]);
+  };
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
+  ASSERT_THAT(result.diagnosis.effects, SizeIs(1)) << result.diagnosis.reason;
+  EXPECT_EQ(result.diagnosis.effects[0].id, "sensor.saturation");
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
 }
 
 }  // namespace
