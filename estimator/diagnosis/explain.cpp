@@ -255,6 +255,55 @@ bool more_is_left(const ExplainInput& input, const EnlargedFit& fit,
   return false;
 }
 
+/// Batch and filter estimates of the certified model: the filter of everything, or one for each
+/// axis where that did not converge.
+void set_final_estimates(const ExplainInput& input, const SearchInput& search,
+                         const SearchResult& estimated, const std::optional<JointEstimate>& joint,
+                         const EnlargedEstimate& certified, ModelEstimates& final) {
+  const Gravity& gravity = input.input.description.gravity;
+  EnlargedParameters bare = estimated.fit.parameters;
+  bare.effects.clear();
+  const auto with_V = predict_means_V(search.log, estimated.fit.parameters);
+  const auto without_V = predict_means_V(search.log, bare);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto first = 4 * static_cast<Eigen::Index>(i);
+    final.batch_ls[i] = with_gravity(axis_of(certified, i), gravity);
+    final.ekf[i] =
+        with_gravity(joint ? AxisEstimate{joint->value.segment<4>(first),
+                                          joint->covariance.block<4, 4>(first, first)}
+                           : filter_estimate(input, search, estimated, with_V[i] - without_V[i], i),
+                     gravity);
+    final.agreement_en[i] = largest_en(final.batch_ls[i], final.ekf[i]);
+  }
+}
+
+/// Residuals of the poses of one axis, and what left-out poses say.
+void set_errors_after(const Eigen::VectorXd& residual_mps2, const LeftOutErrors& left_out,
+                      std::size_t axis, Calibration& result) {
+  for (Eigen::Index k = 0; k < residual_mps2.size(); ++k)
+    result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[axis] = residual_mps2(k);
+  result.after.fit_pose_rms_mps2[axis] = rms(residual_mps2);
+  result.after.heldout_pose_rms_mps2[axis] = rms(left_out.error_mps2);
+  result.after.heldout_pose_max_abs_mps2[axis] = max_abs(left_out.error_mps2);
+}
+
+/// What the noise beside the effects leaves of one axis, of which it leaves `left_V2`; returns the
+/// residual before the effects against that.
+AxisVerdictInput set_floor_after(const SearchResult& found, const Eigen::MatrixXd& left_V2,
+                                 std::size_t axis, Calibration& result) {
+  const double factor = std::abs(found.fit.parameters.mps2_per_V(axis));
+  const double mean_square_V2 =
+      left_V2.trace() / static_cast<double>(left_V2.rows()) + found.beyond_V2[axis].value_or(0);
+  double& floor_mps2 = result.floor_pose_rms_mps2[axis];
+  const double before_mps2 = floor_mps2;
+  floor_mps2 = factor * std::sqrt(std::max(mean_square_V2, 0.0));
+  double& u_floor_mps2 = result.u_floor_pose_rms_mps2[axis];
+  if (before_mps2 > 0) u_floor_mps2 *= floor_mps2 / before_mps2;
+  return {.rms_mps2 = result.before.fit_pose_rms_mps2[axis],
+          .expected_mps2 = floor_mps2,
+          .u_expected_mps2 = std::hypot(u_floor_mps2, factor * scatter_of_rms_V(left_V2))};
+}
+
 }  // namespace
 
 std::optional<Explained> explain(const ExplainInput& input, const CalibrationOptions& options,
@@ -318,55 +367,29 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
 
   // What certifies is estimated from these readings.
   const SearchResult& estimated = codes ? codes->before_converter : found;
-  const auto predicted_V = predict_means_V(log, found.fit.parameters);
-  const auto estimated_V = predict_means_V(estimated_log, estimated.fit.parameters);
-  EnlargedParameters bare = found.fit.parameters;
-  bare.effects.clear();
-  const auto twelve_V = predict_means_V(log, bare);
-  const Gravity& gravity = input.input.description.gravity;
   const auto joint = joint_estimate(input, estimated_search, estimated);
   if (joint) {
     EnlargedEstimate filter{estimated.fit.parameters, joint->covariance};
     filter.parameters.set_free_values(joint->value);
     attach_filter(log, if_true, codes ? codes->with_converter(filter, found) : filter, diagnosis);
   }
-
-  const PerAxis<bool> concerned = axes_concerned(found.fit.parameters);
-  PerAxis<std::optional<AxisVerdictInput>> residual;
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const double factor = found.fit.parameters.mps2_per_V(i);
-    const auto first = 4 * static_cast<Eigen::Index>(i);
-    result.final.batch_ls[i] = with_gravity(axis_of(if_true, i), gravity);
-    result.final.ekf[i] = with_gravity(
-        joint
-            ? AxisEstimate{joint->value.segment<4>(first),
-                           joint->covariance.block<4, 4>(first, first)}
-            : filter_estimate(input, estimated_search, estimated, estimated_V[i] - twelve_V[i], i),
-        gravity);
-    result.final.agreement_en[i] = largest_en(result.final.batch_ls[i], result.final.ekf[i]);
+  set_final_estimates(input, estimated_search, estimated, joint, if_true, result.final);
+  for (std::size_t i = 0; i < kAxisCount; ++i)
     for (AxisEstimate* estimate : {&result.final.batch_ls[i], &result.final.ekf[i]})
-      estimate->covariance += among.block<4, 4>(first, first);
+      estimate->covariance +=
+          among.block<4, 4>(4 * static_cast<Eigen::Index>(i), 4 * static_cast<Eigen::Index>(i));
 
-    const Eigen::VectorXd residual_mps2 = factor * (stated_V[i] - predicted_V[i]);
-    for (Eigen::Index k = 0; k < residual_mps2.size(); ++k)
-      result.pose_results[static_cast<std::size_t>(k)].residual_after_mps2[i] = residual_mps2(k);
-    result.after.fit_pose_rms_mps2[i] = rms(residual_mps2);
-    result.after.heldout_pose_rms_mps2[i] = rms(left_out[i].error_mps2);
-    result.after.heldout_pose_max_abs_mps2[i] = max_abs(left_out[i].error_mps2);
-    result.after.sample_rms_mps2[i] =
-        std::abs(factor) * sample_rms_V(input.input.run, predicted_V[i], i);
-    const Eigen::MatrixXd left_V2 = left_by_noise_V2(found, jacobian, by_means.covariance, i);
-    const double mean_square_V2 =
-        left_V2.trace() / static_cast<double>(left_V2.rows()) + found.beyond_V2[i].value_or(0);
-    const double floor_mps2 = std::abs(factor) * std::sqrt(std::max(mean_square_V2, 0.0));
-    if (result.floor_pose_rms_mps2[i] > 0)
-      result.u_floor_pose_rms_mps2[i] *= floor_mps2 / result.floor_pose_rms_mps2[i];
-    result.floor_pose_rms_mps2[i] = floor_mps2;
-    if (concerned[i])
-      residual[i] = {.rms_mps2 = result.before.fit_pose_rms_mps2[i],
-                     .expected_mps2 = floor_mps2,
-                     .u_expected_mps2 = std::hypot(result.u_floor_pose_rms_mps2[i],
-                                                   std::abs(factor) * scatter_of_rms_V(left_V2))};
+  const auto predicted_V = predict_means_V(log, found.fit.parameters);
+  PerAxis<std::optional<AxisVerdictInput>> residual;
+  const PerAxis<bool> concerned = axes_concerned(found.fit.parameters);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    set_errors_after(found.fit.parameters.mps2_per_V(i) * (stated_V[i] - predicted_V[i]),
+                     left_out[i], i, result);
+    result.after.sample_rms_mps2[i] = std::abs(found.fit.parameters.mps2_per_V(i)) *
+                                      sample_rms_V(input.input.run, predicted_V[i], i);
+    const AxisVerdictInput of_axis = set_floor_after(
+        found, left_by_noise_V2(found, jacobian, by_means.covariance, i), i, result);
+    if (concerned[i]) residual[i] = of_axis;
   }
   result.fitted_terms =
       fitted_terms(log, found.fit.parameters, predicted_V, result.floor_pose_rms_mps2);

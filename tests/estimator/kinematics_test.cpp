@@ -45,5 +45,17 @@ TEST(Kinematics, DerivativesAgreeWithDifferences) {
   }
 }
 
+// A triad that turns right-handed about one of its axes sees the plumb line turn left-handed.
+TEST(Kinematics, ATriadMayTiltInItsSeat) {
+  const double quarter = std::acos(0.0);
+  HeadGeometry about_x, about_y, about_both;
+  about_x.seat_x_rad = about_y.seat_y_rad = quarter;
+  about_both.seat_x_rad = about_both.seat_y_rad = quarter;
+  about_x.h_rad = quarter;  // z_s up
+  expect_vector(specific_force_g(about_x, 1), 0, 1, 0);
+  expect_vector(specific_force_g(about_y, 1), 0, 0, 1);     // x_s up before
+  expect_vector(specific_force_g(about_both, 1), 0, 1, 0);  // about y brings z_s up, about x y_s
+}
+
 }  // namespace
 }  // namespace plumbline
