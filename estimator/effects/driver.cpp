@@ -60,6 +60,15 @@ std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& v
   return rate;
 }
 
+/// By how much δ turned since the previous visit, where the head does not pass from 360° to 0°.
+double plain_turn_rad(const VisitLog& log, std::size_t k) {
+  constexpr double kTurn_rad = 2 * std::numbers::pi;
+  const auto within_a_turn = [](double angle_rad) {
+    return angle_rad - kTurn_rad * std::floor(angle_rad / kTurn_rad);
+  };
+  return within_a_turn(log.visits[k].delta_rad) - within_a_turn(log.before(k)->delta_rad);
+}
+
 /// A range of which zero is the middle, where there is nothing.
 std::pair<double, double> about_zero(const PerAxis<std::vector<double>>& values) {
   double most = 0;
@@ -206,6 +215,8 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
     way.reference = 0;
   };
   add_way("turn of delta since", [&](std::size_t k) { return turn_rad(log, k); });
+  add_way("turn of delta within 360 degrees since",
+          [&](std::size_t k) { return plain_turn_rad(log, k); });
   add_way("change of h since",
           [&](std::size_t k) { return visits[k].h_rad - log.before(k)->h_rad; });
   for (const Column& column : recorded_columns(log)) {
@@ -233,6 +244,8 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
     for (double& value : of_axis) value = std::abs(value);
   const auto size_rad =
       for_all_axes(log, [&](std::size_t k) { return std::abs(turn_rad(log, k)); });
+  const auto plain_size_rad = for_all_axes(
+      log, [&](std::size_t k) { return log.before(k) ? std::abs(plain_turn_rad(log, k)) : 0; });
   const auto size_of_h_rad = for_all_axes(log, [&](std::size_t k) {
     const Visit* before = log.before(k);
     return before ? std::abs(log.visits[k].h_rad - before->h_rad) : 0;
@@ -244,6 +257,7 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   std::vector<Driver> drivers = {
       {"previous_pose", "size of the change of a_i since", std::move(size_g)},
       {"previous_pose", "size of the turn of delta since", size_rad},
+      {"previous_pose", "size of the turn of delta within 360 degrees since", plain_size_rad},
       {"previous_pose", "size of the change of h since", size_of_h_rad},
       {"previous_pose", "time on the way", way_s}};
   for (Driver& driver : drivers) driver.span = about_zero(driver.value);

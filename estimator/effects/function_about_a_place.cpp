@@ -1,8 +1,10 @@
 // Functions of a driver that are something about one place and nothing elsewhere.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numbers>
 #include <set>
 #include <utility>
 #include <vector>
@@ -90,8 +92,8 @@ class Bell final : public DrivenTerm {
                                  const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
     if (!is_sparse() || found.p[1] < 0.5 * spacing()) return others;
-    for (const double away : {-0.4, -0.2, 0.0, 0.2, 0.4})
-      for (const double ratio : {0.6, 0.8, 1.0, 1.25, 1.6})
+    for (const double away : {-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4})
+      for (const double ratio : {0.6, 0.8, 0.9, 1.0, 1.1, 1.25, 1.6})
         others.push_back({{found.p[0] + away * spacing(), ratio * found.p[1], found.p[2]}});
     return others;
   }
@@ -176,6 +178,69 @@ class Seam final : public DrivenTerm {
   }
 };
 
+/// Piece by piece: what a code of the band lacks to the edge that all of them read as.
+class MissingBand final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {place("middle"),
+            {"width", variable().unit(), ParameterRole::shape},
+            {"edge", variable().unit(), ParameterRole::index},
+            {"side", "", ParameterRole::index},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    constexpr double kApart = 0.3;  // of a width
+    std::vector<Hypothesis> starts;
+    if (variable().output_of != axis) return starts;
+    const auto [low, high] = range();
+    for (const double share : kWidths) {
+      const double width = share * (high - low);
+      for (double middle = low + 0.5 * width; middle < high; middle += kApart * width)
+        add(middle, width, starts);
+    }
+    return starts;
+  }
+  /// Each of its edges may pass for a step of the code.
+  std::vector<Hypothesis> in_one(const VisitLog&, std::size_t axis, const Effect& repeated,
+                                 const std::vector<std::vector<double>>& steps) const override {
+    std::vector<Hypothesis> found;
+    if (repeated.id() != "adc.code_step" || variable().output_of != axis) return found;
+    for (const auto& step : steps)
+      for (const double share : kWidths)
+        for (const double away : {-0.5, 0.0, 0.5}) {
+          const double width = share * (range().second - range().first);
+          add(step[1] + away * width, width, found);
+        }
+    return found;
+  }
+
+ private:
+  static constexpr std::array kWidths = {1.0 / 30, 1.0 / 15, 1.0 / 8};  // of the range
+
+  void add(double middle, double width, std::vector<Hypothesis>& starts) const {
+    constexpr double kLeast = 0.004;
+    const double least = kLeast * (range().second - range().first);
+    for (const double side : {-1.0, 1.0})
+      starts.push_back(
+          {{middle, width, std::max(variable().scatter, least), side, target().typical_size()}});
+  }
+  std::string function() const override { return "band that is missing"; }
+  /// p: of a code at the far edge. Mean over readings that scatter.
+  double at(double value, const double* p) const override {
+    const double half = 0.5 * p[1], sd = std::abs(p[2]);
+    const double to_edge = half - p[3] * (value - p[0]);  // from the side that reads right
+    const double within =
+        effect::share_below(to_edge, 0, sd) - effect::share_below(to_edge - p[1], 0, sd);
+    const double at_edges = density(to_edge, sd) - density(to_edge - p[1], sd);
+    return p[4] / p[1] * (to_edge * within + sd * sd * at_edges);
+  }
+  static double density(double x, double sd) {
+    return std::exp(-0.5 * x * x / (sd * sd)) / (sd * std::sqrt(2 * std::numbers::pi));
+  }
+};
+
 class Sector final : public DrivenTerm {
  public:
   using DrivenTerm::DrivenTerm;
@@ -237,6 +302,9 @@ std::unique_ptr<SmoothTerm> resonance(DriverPointer driver, const Target& target
 }
 std::unique_ptr<SmoothTerm> seam(DriverPointer driver, const Target& target) {
   return std::make_unique<Seam>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> missing_band(DriverPointer code, const Target& target) {
+  return std::make_unique<MissingBand>(std::move(code), target);
 }
 std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target) {
   return std::make_unique<Sector>(std::move(angle), target);

@@ -87,6 +87,8 @@ std::unique_ptr<SmoothTerm> resonance(DriverPointer driver, const Target& target
 /// To one side and to the other of an unknown value, over an unknown width (the slope of a bell): a
 /// seam between two segments of a characteristic.
 std::unique_ptr<SmoothTerm> seam(DriverPointer driver, const Target& target);
+/// Codes of an unknown band that all read as one of its edges: codes that are missing.
+std::unique_ptr<SmoothTerm> missing_band(DriverPointer code, const Target& target);
 /// The same between two unknown values of an angle and nothing elsewhere.
 std::unique_ptr<SmoothTerm> sector(DriverPointer angle, const Target& target);
 /// The same between two unknown times, at once or with soft edges; of a dwell in which it begins or
@@ -115,8 +117,8 @@ std::unique_ptr<SmoothTerm> bit_of_code(DriverPointer code, const Target& target
 enum class StepEdge { sharp, gradual };
 /// Nothing on one side of an unknown value, an unknown power of the distance from it on the other.
 std::unique_ptr<SmoothTerm> power_beyond(DriverPointer driver, const Target& target);
-/// Proportional to a component of the specific force, the axis's own, beyond an unknown value or
-/// size and nothing up to it: an amplifier that changes its range.
+/// Proportional to a component of the specific force, the axis's own, with or without an offset,
+/// beyond an unknown value or size and nothing up to it: an amplifier that changes its range.
 std::unique_ptr<SmoothTerm> gain_beyond(DriverPointer component, const Target& target);
 /// From one side to the other twice a turn, at an unknown angle and over an unknown part of it: a
 /// load that is thrown across a play.
@@ -143,6 +145,9 @@ std::unique_ptr<SmoothTerm> relay(DriverPointer driver, const Target& target);
 /// A harmonic of an angle, with amplitude and phase in a straight line of the driver.
 std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                 const Target& target);
+/// A straight line of the driver between two values of an angle, and nothing elsewhere.
+std::unique_ptr<SmoothTerm> line_in_a_part(DriverPointer driver, DriverPointer angle,
+                                           const Target& target);
 /// Two straight lines and their product.
 std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
                                             const Target& target);

@@ -107,6 +107,74 @@ class LineTimesLine final : public DrivenTerm {
   DriverPointer other_;
 };
 
+/// A straight line in one part of an angle's range and nothing elsewhere: what happens at a place
+/// where something else varies.
+class LineInAPart final : public DrivenTerm {
+ public:
+  LineInAPart(DriverPointer driver, DriverPointer angle, Target target)
+      : DrivenTerm(std::move(driver), target), angle_(std::move(angle)) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    // Between two positions nothing moves an edge.
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
+            {"middle", "rad", ParameterRole::index},
+            {"width", "rad", ParameterRole::index},
+            {"p0", target().unit(), ParameterRole::amplitude},
+            {"p1", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    std::vector<Hypothesis> starts;
+    if (!angle_->varies() || !resolves(1)) return starts;
+    const auto [first, last] =
+        std::minmax_element(angle_->value[0].begin(), angle_->value[0].end());
+    if (angle_->angle) {
+      for (const double width_rad : {0.7, 1.4, 2.4})
+        for (double middle_rad = *first; middle_rad < *last; middle_rad += kApart_rad)
+          add(middle_rad, width_rad, starts);
+      return starts;
+    }
+    // From one end of the range to a place.
+    constexpr int kParts = 9;
+    for (int k = 1; k < kParts; ++k) {
+      const double part_rad = (*last - *first) * k / kParts;
+      add(*first, 2 * part_rad, starts);
+      add(*last, 2 * part_rad, starts);
+    }
+    return starts;
+  }
+  std::vector<Hypothesis> closer(const VisitLog&, std::size_t,
+                                 const Hypothesis& found) const override {
+    constexpr int kPlaces = 2;
+    std::vector<Hypothesis> others;
+    for (int low = -kPlaces; angle_->angle && low <= kPlaces; ++low)
+      for (int high = -kPlaces; high <= kPlaces; ++high) {
+        Hypothesis& moved = others.emplace_back(found);
+        moved.p[2] += 0.25 * kApart_rad * (low + high);
+        moved.p[3] += 0.5 * kApart_rad * (high - low);
+      }
+    return others;
+  }
+
+ private:
+  static constexpr double kApart_rad = 15 * kRadPerDeg;
+
+  std::string function() const override { return "straight line in a part of " + angle_->name; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double away_rad = angle_->value[axis][visit] - p[2];
+    const double from_middle_rad =
+        std::abs(angle_->angle ? std::remainder(away_rad, effect::kTurn_rad) : away_rad);
+    if (!(from_middle_rad < 0.5 * p[3])) return 0;
+    return p[4] + p[5] * position(variable().value[axis][visit], p[0], p[1]);
+  }
+  void add(double middle_rad, double width_rad, std::vector<Hypothesis>& starts) const {
+    const double size = target().typical_size();
+    starts.push_back({{range().first, range().second, middle_rad, width_rad, size, size}});
+  }
+
+  DriverPointer angle_;
+};
+
 /// A pattern on the sphere that no component of the specific force makes.
 class HarmonicTimesHarmonic final : public DrivenTerm {
  public:
@@ -154,6 +222,10 @@ std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPoin
 std::unique_ptr<SmoothTerm> parabola_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                     const Target& target) {
   return std::make_unique<LineTimesHarmonic>(std::move(driver), std::move(angle), target, 2);
+}
+std::unique_ptr<SmoothTerm> line_in_a_part(DriverPointer driver, DriverPointer angle,
+                                           const Target& target) {
+  return std::make_unique<LineInAPart>(std::move(driver), std::move(angle), target);
 }
 std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
                                             const Target& target) {

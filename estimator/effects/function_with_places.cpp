@@ -107,7 +107,8 @@ class GainBeyond final : public DrivenTerm {
   std::vector<ParameterInfo> parameters() const override {
     return {{"side", "", ParameterRole::index},
             {"at", variable().unit(), ParameterRole::index},
-            {"p", "g/g", ParameterRole::amplitude}};
+            {"p", "g/g", ParameterRole::amplitude},
+            {"offset", "g", ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
@@ -115,9 +116,15 @@ class GainBeyond final : public DrivenTerm {
     constexpr int kParts = 16;
     const auto [low, high] = range();
     const double most = std::max(std::abs(low), std::abs(high));
+    const double size = target().typical_size();
     for (int k = 1; k < kParts; ++k) {
-      starts.push_back({{kBoth, most * k / kParts, target().typical_size()}});
-      starts.push_back({{kAbove, low + (high - low) * k / kParts, target().typical_size()}});
+      const double of_both = most * k / kParts, above = low + (high - low) * k / kParts;
+      for (const double offset : {0.0, size}) {
+        starts.push_back({{kBoth, of_both, size, offset}});
+        starts.push_back({{kAbove, above, size, offset}});
+      }
+      // An offset alone, beyond one value, is a step.
+      starts.push_back({{kBoth, of_both, 0, size}});
     }
     return starts;
   }
@@ -128,7 +135,7 @@ class GainBeyond final : public DrivenTerm {
     std::vector<Hypothesis> others;
     for (int place = -kPlaces; place <= kPlaces; ++place)
       others.push_back({{found.p[0], found.p[1] + kApart * (range().second - range().first) * place,
-                         found.p[2]}});
+                         found.p[2], found.p[3]}});
     return others;
   }
   double choice_uncertainty(const VisitLog&, std::size_t axis, const std::vector<double>& p,
@@ -147,7 +154,7 @@ class GainBeyond final : public DrivenTerm {
   }
   std::string function() const override { return "gain beyond a value"; }
   double at(double value, const double* p) const override {
-    return decides(value, p[0]) > p[1] ? p[2] * value : 0;
+    return decides(value, p[0]) > p[1] ? p[2] * value + p[3] : 0;
   }
 };
 

@@ -120,7 +120,8 @@ class TermList {
       add(swinging_angle(angle));
       add(head_ringing(angle));
     }
-    for (const DriverPointer& column : columns_) add(line_of_column(column));
+    for (const auto* drivers : {&columns_, &rates_})
+      for (const DriverPointer& driver : *drivers) add(line_of_column(driver));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
       for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
         add(head_decay(angle, of));
@@ -187,7 +188,10 @@ class TermList {
     if (clock || column)
       for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     if (column) add_of_column(driver);
-    if (driver->is_rate()) add_steps(driver, kBias);
+    if (driver->is_rate()) {
+      add_steps(driver, kBias);
+      rates_.push_back(driver);
+    }
     if (clock) add_of_clock(driver);
     if (driver->in_the_twelve) add_of_component(driver);
     if (driver->angle) add_of_angle(driver);
@@ -196,7 +200,8 @@ class TermList {
   }
   void add_of_column(const DriverPointer& driver) {
     columns_.push_back(driver);
-    for (const Target& target : {kBias, kScale}) add_steps(driver, target);
+    for (const Target& target : {kBias, kScale, kDelta, kH}) add_steps(driver, target);
+    add(relay(driver, kBias));
     for (const Target& target : {kBias, kScale})
       for (const OfPlay of : {OfPlay::lag, OfPlay::follower}) add(play(driver, target, of));
     add(power_beyond(driver, kBias));
@@ -250,6 +255,9 @@ class TermList {
         add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
     for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     add(gain_beyond(driver, kBias));
+    // What the weight does to a gear that has play.
+    add(bend(driver, kDelta));
+    add(relay(driver, kDelta));
     add_steps(driver, kBias);
     add_tilt(step(driver, kSeat, StepEdge::sharp));  // a block that rocks
     for (const auto& shape : {bell, seam}) add(shape(driver, kBias));
@@ -301,9 +309,12 @@ class TermList {
       add(harmonic_times_harmonic(angles_[0], angles_[1], kBias));
       followed.push_back(angles_[1]);
     }
+    for (const DriverPointer& rate : rates_)
+      for (const DriverPointer& angle : angles_) add(line_times_harmonic(rate, angle, kBias));
     for (const DriverPointer& driver : followed)
       for (const DriverPointer& angle : angles_) {
         if (driver == angle) continue;
+        add(line_in_a_part(driver, angle, kBias));
         add(line_times_harmonic(driver, angle, kBias));
         add(line_times_harmonic(driver, angle, angle->angle ? kDelta : kH));
       }
@@ -325,6 +336,7 @@ class TermList {
     for (const Target& target : {kDelta, kH, kSkew}) add(wave(turn, target, {0.2, 0.2, 6}));
     add(saw_tooth(turn, kDelta));
     add(relay(turn, kBias));
+    if (angles_.size() == 2) add(line_times_line(turn, angles_[1], kBias));
   }
   void add_of_code(const DriverPointer& code) {
     // What repeats from step to step, or every second step, is the rounding itself, or a bit.
@@ -334,6 +346,7 @@ class TermList {
     add(bend(code, kBias));
     add_steps(code, kBias);
     add(seam(code, kBias));
+    add(missing_band(code, kBias));
     add(bit_of_code(code, kBias, log_.adc));
     add(saw_tooth(code, kBias));
   }
@@ -343,6 +356,7 @@ class TermList {
   std::vector<DriverPointer> columns_;     ///< recorded, but for their rates
   std::vector<DriverPointer> angles_;      ///< delta, then h
   std::vector<DriverPointer> directions_;  ///< two-valued
+  std::vector<DriverPointer> rates_;       ///< of recorded columns
   DriverPointer clock_;
   std::vector<std::unique_ptr<SmoothTerm>> terms_;
 };

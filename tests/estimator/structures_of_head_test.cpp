@@ -203,5 +203,32 @@ TEST(Structure, AnArmThatRingsAfterEveryMoveIsOne) {
   EXPECT_NEAR(parameter(found, "f").value, 6, 0.3);
 }
 
+// As harmonics of the spindle, and steps.
+TEST(Structure, APlayThatTheLoadCrossesGoesByTheLoad) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.delta_error_deg = [side = 1.0](double delta_deg, double h_deg) mutable {
+    const double load = -std::sin(delta_deg * kRadians) * std::cos(h_deg * kRadians);
+    if (load > 0.33) side = 1;
+    if (load < -0.33) side = -1;
+    return 0.3 * side;
+  };
+  expect_only_structure(options, {"a_y", "geometry", "relay, added to delta"});
+}
+
+TEST(Structure, ADriveThatLagsGoesByItsLastTurn) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.delta_error_deg = [last_deg = 0.0, turn_deg = 0.0](double delta_deg, double) mutable {
+    if (delta_deg != last_deg) turn_deg = delta_deg - last_deg;
+    last_deg = delta_deg;
+    return 0.003 * turn_deg;
+  };
+  const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1)) << result.diagnosis.reason;
+  EXPECT_EQ(result.diagnosis.unlisted[0].shape,
+            "polynomial of degree 1 in the turn of delta within 360 degrees since, added to delta");
+}
+
 }  // namespace
 }  // namespace plumbline

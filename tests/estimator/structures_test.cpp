@@ -446,5 +446,54 @@ TEST(Structure, AStopOfTheComponentAloneIsSaturation) {
   EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
 }
 
+// As the column by name, harmonics of the spindle and poses at a wrong angle.
+TEST(Structure, WhatAColumnDoesAtAPlaceIsOne) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  const auto moisture = [](double t_s) { return std::sin(t_s / 50); };
+  const auto with_part = [&](const char* driver, const auto& is_there, const char* shape) {
+    options.more_V[1] = [=](const auto& a_g, double t_s) {
+      return is_there(a_g) ? 6e-4 * moisture(t_s) : 0;
+    };
+    expect_only_structure(with_column(options, driver, moisture), {driver, "bias", shape});
+  };
+  with_part(
+      "rh_pct",
+      [](const auto& a_g) {
+        const double delta_rad = std::atan2(-a_g[1], a_g[0]);
+        return delta_rad > 0.6 && delta_rad < 2.2;
+      },
+      "straight line in a part of delta_deg");
+  with_part(
+      "fan_V", [](const auto& a_g) { return a_g[2] < std::sin(0.61); },
+      "straight line in a part of h_deg");
+}
+
+// As a step of the code, a seam and a drift of the scale.
+TEST(Structure, CodesThatAreMissingAreABand) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  SyntheticRun data = synthetic_run(7, kSixteenBits, options);
+  constexpr int kFirst = -1000, kLast = -960;  // read as the one after the last
+  for (double& u_V : data.run.samples.u_V[0]) {
+    const auto code = std::lround((u_V - kSixteenBits.volts(0)) / kSixteenBits.lsb_V());
+    if (code >= kFirst && code <= kLast) u_V = kSixteenBits.volts(kLast + 1);
+  }
+  expect_only_structure(data, {"code_x", "bias", "band that is missing"});
+}
+
+// As the gain by itself, and a step.
+TEST(Structure, ARangeBeyondAValueHasAZeroOfItsOwn) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[0] = [](const auto& a_g, double) {
+    return a_g[0] > 0.52 ? 1.5e-3 * a_g[0] - 1.2e-3 : 0;
+  };
+  expect_only_structure(options, {"a_x", "bias", "gain beyond a value"});
+}
+
 }  // namespace
 }  // namespace plumbline
