@@ -135,17 +135,25 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
       strongest = std::min(strongest, beside.log_p(c));
     }
     const auto infos = candidate.effect->parameters();
+    const auto is_estimated = [](const ParameterInfo& info) {
+      return info.role != ParameterRole::index;
+    };
     const auto has = [&](ParameterRole role) {
       return std::any_of(infos.begin(), infos.end(),
                          [&](const ParameterInfo& info) { return info.role == role; });
     };
     if (has(ParameterRole::amplitude)) {
       add_amplitudes(candidate, transform, amplitudes);
-    } else if (infos.front().role == ParameterRole::shape && infos.size() == 1) {
+    } else if (std::count_if(infos.begin(), infos.end(), is_estimated) == 1 &&
+               is_estimated(infos.front())) {
       if (sizes.empty() || sizes.back().first->effect != candidate.effect ||
           sizes.back().first->axis != candidate.axis)
         sizes.push_back({&candidate, {}});
-      sizes.back().course.emplace_back(candidate.hypothesis.p.front(), size_sigmas(transform));
+      // One variant stands for all.
+      const std::vector<double>&p = candidate.hypothesis.p,
+            &first = sizes.back().first->hypothesis.p;
+      if (std::equal(p.begin() + 1, p.end(), first.begin() + 1))
+        sizes.back().course.emplace_back(p.front(), size_sigmas(transform));
     }
   }
 

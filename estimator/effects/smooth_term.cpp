@@ -107,24 +107,7 @@ class TermList {
       const auto code = shared(code_driver(log_, axis));
       if (any_ || code->varies()) add_of_code(code);
     }
-    for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
-      for (const int degree : {1, 2, 3}) add(dwell_course(log_, of, degree));
-    for (const CourseOf of : {CourseOf::one, CourseOf::step}) add(ring_down(of));
-    // Of the step of the axis itself it is a listed effect.
-    for (const CourseOf of : {CourseOf::one, CourseOf::step_of_next, CourseOf::step_after_next,
-                              CourseOf::turn_of_delta, CourseOf::turn_of_h})
-      add(decay_in_dwell(of));
-    for (const EventShape shape : {EventShape::step, EventShape::window})
-      add(event_of_dwells(shape));
-    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
-      add(swinging_angle(angle));
-      add(head_ringing(angle));
-    }
-    for (const auto* drivers : {&columns_, &rates_})
-      for (const DriverPointer& driver : *drivers) add(line_of_column(driver));
-    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
-      for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
-        add(head_decay(angle, of));
+    add_of_dwells();
   }
   std::vector<std::unique_ptr<SmoothTerm>> take() { return std::move(terms_); }
 
@@ -337,6 +320,27 @@ class TermList {
     add(saw_tooth(turn, kDelta));
     add(relay(turn, kBias));
     if (angles_.size() == 2) add(line_times_line(turn, angles_[1], kBias));
+  }
+  /// Where something changes while the head rests.
+  void add_of_dwells() {
+    for (const CourseOf of : {CourseOf::one, CourseOf::component, CourseOf::step})
+      for (const int degree : {1, 2, 3}) add(dwell_course(log_, of, degree));
+    for (const CourseOf of : {CourseOf::one, CourseOf::step}) add(ring_down(of));
+    // Of the step of the axis itself it is a listed effect.
+    for (const CourseOf of : {CourseOf::one, CourseOf::step_of_next, CourseOf::step_after_next,
+                              CourseOf::turn_of_delta, CourseOf::turn_of_h})
+      add(decay_in_dwell(of));
+    for (const EventShape shape : {EventShape::step, EventShape::window})
+      add(event_of_dwells(shape));
+    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
+      add(swinging_angle(angle));
+      add(head_ringing(angle));
+    }
+    for (const auto* drivers : {&columns_, &rates_})
+      for (const DriverPointer& driver : *drivers) add(line_of_column(driver));
+    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
+      for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
+        add(head_decay(angle, of));
   }
   void add_of_code(const DriverPointer& code) {
     // What repeats from step to step, or every second step, is the rounding itself, or a bit.
