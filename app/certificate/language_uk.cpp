@@ -449,6 +449,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"the turn of delta on the way", "поворот δ дорогою"},
     {"the change of h on the way", "зміну h дорогою"},
     {"{} in the change from the average of the past", "{} від зміни відносно середнього минулого"},
+    {"{} in the average of the past of its square", "{} від середнього минулого її квадрата"},
     {"{} in the average of the past", "{} від середнього минулого"},
     {"{}, time constant {} s", "{}, стала часу {} s"},
     {"{} in the change of a_i since", "{} від зміни a_i відтоді"},

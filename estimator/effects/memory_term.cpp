@@ -51,18 +51,30 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
   return average;
 }
 
-/// One variable and its averages, or what it is above them.
+enum class MemoryOf { average, rest, square };
+
+/// One variable and its averages, what it is above them, or the averages of its square.
 class Memory {
  public:
-  Memory(DriverPointer driver, bool less_average, const VisitLog& log)
-      : driver_(std::move(driver)),
-        name_(driver_->name + (less_average && driver_->recorded ? ".rate" : "")),
-        less_average_(less_average),
-        log_(log) {}
+  Memory(const DriverPointer& driver, MemoryOf of, const VisitLog& log)
+      : driver_(of == MemoryOf::square ? squared(*driver) : driver),
+        name_(driver_->name + (of == MemoryOf::rest && driver_->recorded ? ".rate" : "")),
+        less_average_(of == MemoryOf::rest),
+        is_square_(of == MemoryOf::square),
+        log_(log) {
+    const auto [low, high] = std::minmax_element(driver->value[0].begin(), driver->value[0].end());
+    // Of what has one sign the square runs like the variable itself.
+    shows_square_ = std::min(-*low, *high) > 0.25 * std::max(-*low, *high);
+  }
 
   const std::string& name() const { return name_; }
   bool is_of_column() const { return driver_->recorded; }
-  std::string unit() const { return driver_->unit(); }
+  std::string unit() const { return driver_->unit() + (is_square_ ? "^2" : ""); }
+  std::string words() const {
+    return std::string(vanishes_at_rest() ? "the change from " : "") + "the average of the past" +
+           (is_square_ ? " of its square" : "");
+  }
+  bool is_shown() const { return !is_square_ || shows_square_; }
   std::vector<std::string> columns() const { return driver_->columns(); }
   /// At which U₀ and K are stated.
   double reference() const { return less_average_ ? 0 : driver_->reference.value_or(0); }
@@ -106,9 +118,18 @@ class Memory {
     }
   }
 
+  static DriverPointer squared(Driver driver) {
+    for (auto& of_axis : driver.value)
+      for (double& value : of_axis) value *= value;
+    const std::vector<double>& value = driver.value[0];
+    driver.reference =
+        std::accumulate(value.begin(), value.end(), 0.0) / static_cast<double>(value.size());
+    return shared(std::move(driver));
+  }
+
   DriverPointer driver_;
   std::string name_;
-  bool less_average_;
+  bool less_average_, is_square_, shows_square_ = false;
   const VisitLog& log_;
   // Made when it is first asked for: a log of many visits may need none.
   mutable std::once_flag once_;
@@ -126,9 +147,7 @@ class MemoryTerm final : public SmoothTerm {
   const std::string& driver() const override { return memory_->name(); }
   TermForm form() const override { return target_.form; }
   std::string shape() const override {
-    const char* argument = memory_->vanishes_at_rest() ? "the change from the average of the past"
-                                                       : "the average of the past";
-    return std::string("straight line in ") + argument + target_.words();
+    return "straight line in " + memory_->words() + target_.words();
   }
   Subject subject() const override {
     return target_.form == TermForm::geometry ? Subject::head : Subject::sensor;
@@ -153,6 +172,7 @@ class MemoryTerm final : public SmoothTerm {
     const double step_s = span_s / std::max<double>(1, static_cast<double>(log.visits.size()) - 1);
     const double size = target_.typical_size();
     std::vector<Hypothesis> starts;
+    if (!memory_->is_shown()) return starts;
     for (const double tau_s : effect::geometric(kLeast_s, kMost_s, kTimeConstants)) {
       if (tau_s < step_s || tau_s > span_s / 2) continue;
       const auto [low, high] = memory_->range(tau_s);
@@ -210,10 +230,10 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
                                                       const DriverPointer& attitude,
                                                       const std::vector<DriverPointer>& columns) {
   std::vector<std::shared_ptr<const Memory>> memories = {
-      std::make_shared<const Memory>(attitude, true, log)};
+      std::make_shared<const Memory>(attitude, MemoryOf::rest, log)};
   for (const DriverPointer& column : columns)
-    for (const bool less_average : {false, true})
-      memories.push_back(std::make_shared<const Memory>(column, less_average, log));
+    for (const MemoryOf of : {MemoryOf::average, MemoryOf::rest})
+      memories.push_back(std::make_shared<const Memory>(column, of, log));
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   for (const auto& memory : memories)
     for (const TermForm form : {TermForm::bias, TermForm::scale})
@@ -226,6 +246,10 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
     for (const Target& target : {kDelta, kH, kRoll}) terms.push_back(of(target));
     terms.push_back(towards_a_direction(of(kTilt)));
   }
+  for (const DriverPointer& column : columns)
+    terms.push_back(
+        std::make_unique<MemoryTerm>(std::make_shared<const Memory>(column, MemoryOf::square, log),
+                                     Target{TermForm::bias}, longest_s));
   return terms;
 }
 

@@ -257,5 +257,23 @@ TEST(Structure, ACableThatFlipsOverIsARelayOfTheTurn) {
   expect_only_structure(options, {"delta_deg", "bias", "relay in the angle that does not close"});
 }
 
+// As a bell in time.
+TEST(Structure, WhatACurrentHeatsGoesByThePastOfItsSquare) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  const auto current = [](double t_s) { return 2 * std::sin(t_s / 40) * std::cos(t_s / 170); };
+  options.more_V[2] = [heat = 0.0, last_s = 0.0, current](const auto&, double t_s) mutable {
+    constexpr double kTau_s = 45;
+    const double share = std::exp(-std::max(0.0, t_s - last_s) / kTau_s);
+    heat = heat * share + (1 - share) * current(t_s) * current(t_s);
+    last_s = t_s;
+    return 6e-4 * heat;
+  };
+  expect_only_structure(
+      with_column(options, "motor_A", current),
+      {"motor_A", "bias", "straight line in the average of the past of its square"});
+}
+
 }  // namespace
 }  // namespace plumbline
