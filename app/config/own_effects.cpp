@@ -128,6 +128,11 @@ class OwnEffect final : public Effect {
     for (const Parameter& p : description_.parameters) infos.push_back(p.info);
     return infos;
   }
+  bool acts_on(std::size_t axis) const override {
+    return subject() == Subject::head ||
+           std::find(description_.axes.begin(), description_.axes.end(), axis) !=
+               description_.axes.end();
+  }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     if (!acts_on(axis)) return {};
     std::vector<Hypothesis> starts = {{}};
@@ -223,12 +228,6 @@ class OwnEffect final : public Effect {
   static double mean_time_in_pose_s(const VisitLog& log, std::size_t visit) {
     return log.visits[visit].t_mean_s - log.visits[visit].t_arrival_s;
   }
-  bool acts_on(std::size_t axis) const {
-    return subject() == Subject::head ||
-           std::find(description_.axes.begin(), description_.axes.end(), axis) !=
-               description_.axes.end();
-  }
-
   /// a_g and axis: null for the head, whose geometry is what is being changed.
   double value(const VisitLog& log, std::size_t visit, const std::vector<Eigen::Vector3d>* a_g,
                const std::size_t* axis, const double* p, double since_arrival_s) const {
