@@ -75,6 +75,10 @@ std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParamete
     // In an order of poses like this one several may show it alike: the likelier cause first.
     constexpr double kClearly = 0.7;
     for (const Driver* driver : likeliest_first(drivers, term.axis, smooth)) {
+      // What it names shows it, even where something else decides, too.
+      if (best != nullptr && smooth != nullptr && best->name == smooth->driver() &&
+          driver->name != smooth->driver())
+        break;
       const double rough = roughness(driver->value[term.axis], course_mps2);
       if (!(rough < kClearly * least)) continue;
       least = rough;
