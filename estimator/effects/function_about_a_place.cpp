@@ -163,8 +163,8 @@ class Seam final : public DrivenTerm {
     const auto [low, high] = range();
     for (const double share : {1.0 / 40, 1.0 / 18, 1.0 / 8}) {
       const double width = share * (high - low);
-      for (double middle = low + width; middle < high; middle += width)
-        starts.push_back({{middle, width, target().typical_size()}});
+      for (int k = 1; low + k * width < high; ++k)
+        starts.push_back({{low + k * width, width, target().typical_size()}});
     }
     return starts;
   }
@@ -197,8 +197,8 @@ class MissingBand final : public DrivenTerm {
     const auto [low, high] = range();
     for (const double share : kWidths) {
       const double width = share * (high - low);
-      for (double middle = low + 0.5 * width; middle < high; middle += kApart * width)
-        add(middle, width, starts);
+      for (int k = 0; low + (0.5 + kApart * k) * width < high; ++k)
+        add(low + (0.5 + kApart * k) * width, width, starts);
     }
     return starts;
   }

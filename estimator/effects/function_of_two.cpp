@@ -130,8 +130,8 @@ class LineInAPart final : public DrivenTerm {
         std::minmax_element(angle_->value[0].begin(), angle_->value[0].end());
     if (angle_->angle) {
       for (const double width_rad : {0.7, 1.4, 2.4})
-        for (double middle_rad = *first; middle_rad < *last; middle_rad += kApart_rad)
-          add(middle_rad, width_rad, starts);
+        for (int k = 0; *first + k * kApart_rad < *last; ++k)
+          add(*first + k * kApart_rad, width_rad, starts);
       return starts;
     }
     // From one end of the range to a place.
