@@ -11,6 +11,7 @@
 #include "estimator/kinematics.h"
 #include "estimator/noise/covariance.h"
 #include "estimator/noise/powers_allowance.h"
+#include "estimator/noise/square.h"
 
 namespace plumbline {
 namespace {
@@ -18,8 +19,6 @@ namespace {
 /// Parameters and rounding depend on each other; the second round changes nothing that is felt.
 constexpr int kRoundingRounds = 3;
 constexpr int kEdgeRounds = 10;  // the same where the steps keep their edges
-
-double squared(double value) { return value * value; }
 
 double samples_per_pose(const MeasurementSet& run) {
   return static_cast<double>(run.samples.size()) / static_cast<double>(run.poses.size());
@@ -43,8 +42,8 @@ Eigen::VectorXd positioning_variance_V2(const Experiment& experiment,
   for (Eigen::Index row = 0; row < variance.size(); ++row) {
     const Pose& pose = experiment.poses[static_cast<std::size_t>(row)].pose;
     const SpecificForce force = specific_force(pose.delta_deg, pose.h_deg, gamma);
-    variance(row) = squared(u_delta_rad * force.d_delta_g_per_rad.dot(K_V_per_g)) +
-                    squared(u_h_rad * force.d_h_g_per_rad.dot(K_V_per_g));
+    variance(row) = square(u_delta_rad * force.d_delta_g_per_rad.dot(K_V_per_g)) +
+                    square(u_h_rad * force.d_h_g_per_rad.dot(K_V_per_g));
   }
   return variance;
 }
@@ -71,7 +70,7 @@ void use_codes(const Experiment& experiment, std::size_t axis, AxisFit& work) {
     if (i != kTermQ && i != kTermN && power > 0) V += power * experiment.processes.unit[i];
   }
   // The scatter found between the codes of different poses holds the slow noise once more.
-  const double twice_V2 = std::min(squared(quantized->use.scatter_V), V.diagonal().mean());
+  const double twice_V2 = std::min(square(quantized->use.scatter_V), V.diagonal().mean());
   quantized->variance_V2 = quantized->variance_without_V2(twice_V2);
   V.diagonal() += quantized->variance_V2;
   const auto fit = fit_generalised(experiment.A, quantized->mean_V, V);

@@ -148,8 +148,7 @@ std::vector<PoseResult> pose_results(const std::vector<PoseMean>& poses) {
 /// Writes the fit of one axis into the result: its estimates, residuals and errors on poses of the
 /// fit, and what the verdict goes by. Returns the factor by which its covariance is inflated.
 double report_axis(const Experiment& experiment, const AxisFit& work, std::size_t axis,
-                   VerdictInput& verdict, Calibration& result) {
-  const double mps2_per_V = input_referred_mps2_per_V(work.fit.estimate, axis);
+                   double mps2_per_V, VerdictInput& verdict, Calibration& result) {
   if (work.quantized) result.quantization[axis] = work.quantized->use;
   result.diagnosis.axis_test[axis] = {work.test.chi2, work.test.dof, work.test.p_value};
   const Eigen::VectorXd residual_mps2 = mps2_per_V * (work.fit.residual_V + work.rounding_V);
@@ -227,9 +226,9 @@ Calibration calibrate_in_noise(const FurtherNoise& further, const PreparedRun& r
   PerAxis<double> inflation{};
   PerAxis<LeftOutErrors> left_out;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    inflation[axis] = report_axis(experiment, work[axis], axis, verdict, result);
-    left_out[axis] = left_out_errors(experiment, work[axis],
-                                     input_referred_mps2_per_V(work[axis].fit.estimate, axis));
+    const double mps2_per_V = input_referred_mps2_per_V(work[axis].fit.estimate, axis);
+    inflation[axis] = report_axis(experiment, work[axis], axis, mps2_per_V, verdict, result);
+    left_out[axis] = left_out_errors(experiment, work[axis], mps2_per_V);
     result.before.heldout_pose_rms_mps2[axis] = rms(left_out[axis].error_mps2);
     result.before.heldout_pose_max_abs_mps2[axis] = max_abs(left_out[axis].error_mps2);
   }

@@ -374,19 +374,18 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
     attach_filter(log, if_true, codes ? codes->with_converter(filter, found) : filter, diagnosis);
   }
   set_final_estimates(input, estimated_search, estimated, joint, if_true, result.final);
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    for (AxisEstimate* estimate : {&result.final.batch_ls[i], &result.final.ekf[i]})
-      estimate->covariance +=
-          among.block<4, 4>(4 * static_cast<Eigen::Index>(i), 4 * static_cast<Eigen::Index>(i));
 
   const auto predicted_V = predict_means_V(log, found.fit.parameters);
   PerAxis<std::optional<AxisVerdictInput>> residual;
   const PerAxis<bool> concerned = axes_concerned(found.fit.parameters);
   for (std::size_t i = 0; i < kAxisCount; ++i) {
-    set_errors_after(found.fit.parameters.mps2_per_V(i) * (stated_V[i] - predicted_V[i]),
-                     left_out[i], i, result);
-    result.after.sample_rms_mps2[i] = std::abs(found.fit.parameters.mps2_per_V(i)) *
-                                      sample_rms_V(input.input.run, predicted_V[i], i);
+    const auto first = 4 * static_cast<Eigen::Index>(i);
+    for (AxisEstimate* estimate : {&result.final.batch_ls[i], &result.final.ekf[i]})
+      estimate->covariance += among.block<4, 4>(first, first);
+    const double factor = found.fit.parameters.mps2_per_V(i);
+    set_errors_after(factor * (stated_V[i] - predicted_V[i]), left_out[i], i, result);
+    result.after.sample_rms_mps2[i] =
+        std::abs(factor) * sample_rms_V(input.input.run, predicted_V[i], i);
     const AxisVerdictInput of_axis = set_floor_after(
         found, left_by_noise_V2(found, jacobian, by_means.covariance, i), i, result);
     if (concerned[i]) residual[i] = of_axis;

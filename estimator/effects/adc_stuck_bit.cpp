@@ -31,23 +31,13 @@ class StuckBitEffect final : public Effect {
   bool certain(const VisitLog&, std::size_t) const override { return true; }
   double term_g(const TermInput& input, const double* p) const override {
     const Adc& adc = *input.log.adc;
-    // In units of the bit, counted from the lower end of the span: codes with the bit set begin at
-    // odd numbers.
+    // In units of the bit, counted from the lower end of the span.
     const double size_V = adc.lsb_V() * std::ldexp(1.0, static_cast<int>(p[0]));
     const double half_code = 0.5 * adc.lsb_V() / size_V;
     const double value = (input.output_V - adc.min_V) / size_V + half_code;
     const double sd = std::min(p[2] / size_V, effect::kMostNoise);
     const bool set = p[1] > 0.5;
-    double wrong = 0;
-    const double first = std::floor(value - effect::kReach * sd);
-    // Counted: where a fit strays to 1e16 steps, one more is the same number.
-    const int steps = effect::whole_numbers(first, value + effect::kReach * sd);
-    for (int k = 0; k < steps; ++k) {
-      const double from = first + k;
-      const bool is_set = std::fmod(std::abs(from), 2) == 1;
-      if (is_set == set) continue;
-      wrong += effect::share_below(from + 1, value, sd) - effect::share_below(from, value, sd);
-    }
+    const double wrong = effect::share_with_bit(value, sd, !set);
     // The bit is lost after rounding, which such readings therefore are not freed of.
     const double rounding_V =
         rounding_bias(input.output_V, adc.min_V, adc.lsb_V(), std::abs(p[2])).bias;

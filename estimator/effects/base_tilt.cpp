@@ -126,13 +126,10 @@ class BaseTilt final : public SmoothTerm {
   void tilt(const HeadGeometry& by, const double* p, HeadGeometry& head) const {
     const double direction_rad = p[term_->parameters().size()] * kRadPerDeg;
     const double cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
-    if (of_seat_) {
-      head.seat_y_rad += by.seat_y_rad * cosine;
-      head.seat_x_rad += by.seat_y_rad * sine;
-    } else {
-      head.h_rad += by.h_rad * cosine;
-      head.roll_rad += by.h_rad * sine;
-    }
+    const auto along = of_seat_ ? &HeadGeometry::seat_y_rad : &HeadGeometry::h_rad;
+    const auto across = of_seat_ ? &HeadGeometry::seat_x_rad : &HeadGeometry::roll_rad;
+    head.*along += by.*along * cosine;
+    head.*across += by.*along * sine;
   }
 
   std::unique_ptr<SmoothTerm> term_;

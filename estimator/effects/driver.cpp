@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <set>
 
@@ -45,7 +44,7 @@ PerAxis<std::vector<double>> changes_g(const VisitLog& log) {
 double turn_rad(const VisitLog& log, std::size_t visit) {
   const Visit* before = log.before(visit);
   if (before == nullptr) return 0;
-  return std::remainder(log.visits[visit].delta_rad - before->delta_rad, 2 * std::numbers::pi);
+  return shorter_turn_rad(*before, log.visits[visit]);
 }
 
 // Slope between the neighbours of a visit, per hour.
@@ -58,15 +57,6 @@ std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& v
     rate[k] = span_s > 0 ? 3600 * (value[after] - value[before]) / span_s : 0;
   }
   return rate;
-}
-
-/// By how much δ turned since the previous visit, where the head does not pass from 360° to 0°.
-double plain_turn_rad(const VisitLog& log, std::size_t k) {
-  constexpr double kTurn_rad = 2 * std::numbers::pi;
-  const auto within_a_turn = [](double angle_rad) {
-    return angle_rad - kTurn_rad * std::floor(angle_rad / kTurn_rad);
-  };
-  return within_a_turn(log.visits[k].delta_rad) - within_a_turn(log.before(k)->delta_rad);
 }
 
 /// A range of which zero is the middle, where there is nothing.
@@ -216,7 +206,7 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
   };
   add_way("turn of delta since", [&](std::size_t k) { return turn_rad(log, k); });
   add_way("turn of delta within 360 degrees since",
-          [&](std::size_t k) { return plain_turn_rad(log, k); });
+          [&](std::size_t k) { return commanded_turn_rad(*log.before(k), visits[k]); });
   add_way("change of h since",
           [&](std::size_t k) { return visits[k].h_rad - log.before(k)->h_rad; });
   for (const Column& column : recorded_columns(log)) {
@@ -244,8 +234,10 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
     for (double& value : of_axis) value = std::abs(value);
   const auto size_rad =
       for_all_axes(log, [&](std::size_t k) { return std::abs(turn_rad(log, k)); });
-  const auto plain_size_rad = for_all_axes(
-      log, [&](std::size_t k) { return log.before(k) ? std::abs(plain_turn_rad(log, k)) : 0; });
+  const auto plain_size_rad = for_all_axes(log, [&](std::size_t k) {
+    const Visit* before = log.before(k);
+    return before ? std::abs(commanded_turn_rad(*before, log.visits[k])) : 0;
+  });
   const auto size_of_h_rad = for_all_axes(log, [&](std::size_t k) {
     const Visit* before = log.before(k);
     return before ? std::abs(log.visits[k].h_rad - before->h_rad) : 0;

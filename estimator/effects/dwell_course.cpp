@@ -27,8 +27,7 @@ double factor_of(CourseOf of, const TermInput& input) {
     case CourseOf::step_after_next:
       return step_g(2);
     case CourseOf::turn_of_delta:
-      if (before == nullptr) return 0;
-      return std::abs(std::remainder(input.at().delta_rad - before->delta_rad, effect::kTurn_rad));
+      return before == nullptr ? 0 : std::abs(shorter_turn_rad(*before, input.at()));
     case CourseOf::turn_of_h:
       return before == nullptr ? 0 : std::abs(input.at().h_rad - before->h_rad);
   }

@@ -34,7 +34,19 @@ double share_below(double edge, double value, double sd) {
   return normal_below((edge - value) / sd);
 }
 
-// Over a run of hours the phase at its end must change by little only.
+double share_with_bit(double value, double sd, bool set) {
+  const double first = std::floor(value - kReach * sd);
+  // Counted: where a fit strays to 1e16 steps, one more is the same number.
+  const int steps = whole_numbers(first, value + kReach * sd);
+  double share = 0;
+  for (int k = 0; k < steps; ++k) {
+    const double from = first + k;
+    if ((std::fmod(std::abs(from), 2) == 1) == set)
+      share += share_below(from + 1, value, sd) - share_below(from, value, sd);
+  }
+  return share;
+}
+
 namespace {
 
 std::complex<double> turn_of_sample(const Visit& visit, const double* p) {
@@ -72,6 +84,7 @@ std::vector<Hypothesis> starts_of_ringing(const Visit& visit) {
   return starts;
 }
 
+// Over a run of hours the phase at its end must change by little only.
 ParameterInfo line_frequency() { return {"f", "Hz", ParameterRole::shape, 1e-7}; }
 ParameterInfo line_phase() { return {"phase", "deg", ParameterRole::shape, 1e-2}; }
 

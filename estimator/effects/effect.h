@@ -239,6 +239,9 @@ double share_below(double edge, double value, double sd);
 /// How many whole numbers there are from the whole number `first` to `last`. None where a fit has
 /// strayed so far that they are not finite.
 int whole_numbers(double first, double last);
+/// Share of Gaussian noise of standard deviation `sd` about `value`, both in units of a bit, where
+/// that bit of the code is as `set` says: codes with the bit set begin at odd numbers.
+double share_with_bit(double value, double sd, bool set);
 inline constexpr double kLeastNoise = 0.02;  ///< steps, where a search for more starts
 inline constexpr double kMostNoise = 3;      ///< steps, beyond which nothing of them is left
 inline constexpr double kReach = 6;  ///< standard deviations beyond which noise does not come

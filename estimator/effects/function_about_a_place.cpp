@@ -48,9 +48,21 @@ class OnePosition final : public DrivenTerm {
   }
 };
 
-class Bell final : public DrivenTerm {
+/// Something of unknown middle and width.
+class AboutAPlace : public DrivenTerm {
  public:
   using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {place("middle"),
+            {"width", variable().unit(), ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+};
+
+class Bell final : public AboutAPlace {
+ public:
+  using AboutAPlace::AboutAPlace;
 
   std::vector<ParameterInfo> parameters() const override {
     const std::string unit = variable().unit();
@@ -58,9 +70,7 @@ class Bell final : public DrivenTerm {
       return {{"middle", unit, ParameterRole::index},
               {"width", unit, ParameterRole::index},
               {"p", target().unit(), ParameterRole::amplitude}};
-    return {place("middle"),
-            {"width", unit, ParameterRole::shape},
-            {"p", target().unit(), ParameterRole::amplitude}};
+    return AboutAPlace::parameters();
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
@@ -120,15 +130,10 @@ class Bell final : public DrivenTerm {
   }
 };
 
-class Resonance final : public DrivenTerm {
+class Resonance final : public AboutAPlace {
  public:
-  using DrivenTerm::DrivenTerm;
+  using AboutAPlace::AboutAPlace;
 
-  std::vector<ParameterInfo> parameters() const override {
-    return {place("middle"),
-            {"width", variable().unit(), ParameterRole::shape},
-            {"p", target().unit(), ParameterRole::amplitude}};
-  }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     constexpr int kPlaces = 16;
     const auto [low, high] = range();
@@ -148,15 +153,10 @@ class Resonance final : public DrivenTerm {
   }
 };
 
-class Seam final : public DrivenTerm {
+class Seam final : public AboutAPlace {
  public:
-  using DrivenTerm::DrivenTerm;
+  using AboutAPlace::AboutAPlace;
 
-  std::vector<ParameterInfo> parameters() const override {
-    return {place("middle"),
-            {"width", variable().unit(), ParameterRole::shape},
-            {"p", target().unit(), ParameterRole::amplitude}};
-  }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
     if (is_of_another_axis(axis)) return starts;

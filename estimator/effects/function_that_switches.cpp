@@ -391,16 +391,7 @@ class BitOfCode final : public DrivenTerm {
 
   std::string function() const override { return "bit of the code"; }
   double at(double value, const double* p) const override {
-    const double x = (value - p[0]) / p[1], sd = variable().scatter / p[1];
-    const double first = std::floor(x - effect::kReach * sd);
-    const int steps = effect::whole_numbers(first, x + effect::kReach * sd);
-    double set = 0;
-    for (int k = 0; k < steps; ++k) {
-      const double from = first + k;
-      if (std::fmod(std::abs(from), 2) == 1)
-        set += effect::share_below(from + 1, x, sd) - effect::share_below(from, x, sd);
-    }
-    return p[2] * set;
+    return p[2] * effect::share_with_bit((value - p[0]) / p[1], variable().scatter / p[1], true);
   }
 
   std::optional<Adc> adc_;

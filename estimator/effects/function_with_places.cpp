@@ -1,10 +1,6 @@
 // Functions of a driver at some values of which something happens.
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <iterator>
-#include <map>
-#include <set>
 #include <utility>
 #include <vector>
 

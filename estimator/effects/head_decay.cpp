@@ -2,35 +2,28 @@
 
 #include <cmath>
 
-#include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/head_in_dwell.h"
 
 namespace plumbline {
 namespace {
 
-class HeadDecay final : public SmoothTerm {
+class HeadDecay final : public HeadInDwell {
  public:
-  HeadDecay(double HeadGeometry::*angle, DecayOf of) : angle_(angle), of_(of) {}
+  HeadDecay(double HeadGeometry::*angle, DecayOf of) : HeadInDwell(angle), of_(of) {}
 
-  std::string id() const override { return "unlisted:t_in_pose:geometry"; }
-  const std::string& driver() const override { return driver_; }
-  TermForm form() const override { return TermForm::geometry; }
   std::string shape() const override {
-    std::string words =
-        "exponential after arrival" + Target{.form = TermForm::geometry, .angle = angle_}.words();
     switch (of_) {
       case DecayOf::one:
         break;
       case DecayOf::weight:
-        return words + ", times the cosine of h";
+        return HeadInDwell::shape() + ", times the cosine of h";
       case DecayOf::way:
-        return words + ", times the way turned";
+        return HeadInDwell::shape() + ", times the way turned";
     }
-    return words;
+    return HeadInDwell::shape();
   }
-  Subject subject() const override { return Subject::head; }
   bool remembers() const override { return of_ == DecayOf::way; }
   bool guesses_at_start() const override { return remembers(); }
-  bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     // true_at 0: the angle is right in the end; 1: it was right on arrival.
     return {{"c", of_ == DecayOf::way ? "" : "deg", ParameterRole::amplitude},
@@ -51,15 +44,15 @@ class HeadDecay final : public SmoothTerm {
                 HeadGeometry& head) const override {
     const Visit& at = log.visits[visit];
     const double decay = effect::mean_decay(at, at.t_arrival_s, p[1]);
-    head.*angle_ += size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0));
+    head.*angle() += size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0));
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
     const Eigen::ArrayXd decay = effect::decay_since_arrival(log.visits[visit], p[1]);
-    return {angle_, size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
+    return {angle(), size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
   }
 
  private:
-  bool is_delta() const { return angle_ == &HeadGeometry::delta_rad; }
+  std::string function() const override { return "exponential after arrival"; }
   /// From arrival to the end.
   double size_rad(const VisitLog& log, std::size_t visit, const double* p) const {
     const Visit& at = log.visits[visit];
@@ -71,31 +64,19 @@ class HeadDecay final : public SmoothTerm {
       case DecayOf::way: {
         const Visit* before = log.before(visit);
         if (before == nullptr) return 0;
-        return p[0] * (is_delta()
-                           ? std::remainder(before->delta_rad - at.delta_rad, effect::kTurn_rad)
-                           : before->h_rad - at.h_rad);
+        return p[0] * (is_delta() ? shorter_turn_rad(at, *before) : before->h_rad - at.h_rad);
       }
     }
     return p[0] * kRadPerDeg;
   }
 
-  double HeadGeometry::*angle_;
   DecayOf of_;
-  std::string driver_ = "t_in_pose";
 };
 
-class HeadRinging final : public SmoothTerm {
+class HeadRinging final : public HeadInDwell {
  public:
-  explicit HeadRinging(double HeadGeometry::*angle) : angle_(angle) {}
+  using HeadInDwell::HeadInDwell;
 
-  std::string id() const override { return "unlisted:t_in_pose:geometry"; }
-  const std::string& driver() const override { return driver_; }
-  TermForm form() const override { return TermForm::geometry; }
-  std::string shape() const override {
-    return "ringing that dies away" + Target{.form = TermForm::geometry, .angle = angle_}.words();
-  }
-  Subject subject() const override { return Subject::head; }
-  bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"f", "Hz", ParameterRole::shape},
             {"tau", "s", ParameterRole::shape},
@@ -109,15 +90,14 @@ class HeadRinging final : public SmoothTerm {
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*angle_ += effect::mean_of_ringing(log.visits[visit], p) * kRadPerDeg;
+    head.*angle() += effect::mean_of_ringing(log.visits[visit], p) * kRadPerDeg;
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    return {angle_, effect::ringing(log.visits[visit], p) * kRadPerDeg};
+    return {angle(), effect::ringing(log.visits[visit], p) * kRadPerDeg};
   }
 
  private:
-  double HeadGeometry::*angle_;
-  std::string driver_ = "t_in_pose";
+  std::string function() const override { return "ringing that dies away"; }
 };
 
 }  // namespace

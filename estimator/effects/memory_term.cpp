@@ -59,8 +59,7 @@ class Memory {
   Memory(const DriverPointer& driver, MemoryOf of, const VisitLog& log)
       : driver_(of == MemoryOf::square ? squared(*driver) : driver),
         name_(driver_->name + (of == MemoryOf::rest && driver_->recorded ? ".rate" : "")),
-        less_average_(of == MemoryOf::rest),
-        is_square_(of == MemoryOf::square),
+        of_(of),
         log_(log) {
     const auto [low, high] = std::minmax_element(driver->value[0].begin(), driver->value[0].end());
     // Of what has one sign the square runs like the variable itself.
@@ -69,18 +68,18 @@ class Memory {
 
   const std::string& name() const { return name_; }
   bool is_of_column() const { return driver_->recorded; }
-  std::string unit() const { return driver_->unit() + (is_square_ ? "^2" : ""); }
+  std::string unit() const { return driver_->unit() + (of_ == MemoryOf::square ? "^2" : ""); }
   std::string words() const {
     return std::string(vanishes_at_rest() ? "the change from " : "") + "the average of the past" +
-           (is_square_ ? " of its square" : "");
+           (of_ == MemoryOf::square ? " of its square" : "");
   }
-  bool is_shown() const { return !is_square_ || shows_square_; }
+  bool is_shown() const { return of_ != MemoryOf::square || shows_square_; }
   std::vector<std::string> columns() const { return driver_->columns(); }
   /// At which U₀ and K are stated.
-  double reference() const { return less_average_ ? 0 : driver_->reference.value_or(0); }
+  double reference() const { return of_ == MemoryOf::rest ? 0 : driver_->reference.value_or(0); }
   /// Of an attitude, nothing when the head has long been at rest: the 12 parameters are those of
   /// rest then.
-  bool vanishes_at_rest() const { return less_average_ && !driver_->recorded; }
+  bool vanishes_at_rest() const { return of_ == MemoryOf::rest && !driver_->recorded; }
   /// For the time constants that time_constants_s() lists, and by interpolation in between.
   double at(double tau_s, std::size_t axis, std::size_t visit) const {
     std::call_once(once_, [this] { make_table(); });
@@ -91,7 +90,7 @@ class Memory {
     const std::size_t source = axis % sources();
     const double average = std::lerp(table_[below][source][visit], table_[below + 1][source][visit],
                                      position - static_cast<double>(below));
-    return less_average_ ? driver_->value[source][visit] - average : average;
+    return of_ == MemoryOf::rest ? driver_->value[source][visit] - average : average;
   }
   /// Over all axes and visits.
   std::pair<double, double> range(double tau_s) const {
@@ -129,7 +128,8 @@ class Memory {
 
   DriverPointer driver_;
   std::string name_;
-  bool less_average_, is_square_, shows_square_ = false;
+  MemoryOf of_;
+  bool shows_square_ = false;
   const VisitLog& log_;
   // Made when it is first asked for: a log of many visits may need none.
   mutable std::once_flag once_;

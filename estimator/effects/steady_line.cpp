@@ -4,45 +4,36 @@
 #include <string>
 #include <utility>
 
-#include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/head_in_dwell.h"
 
 namespace plumbline {
 namespace {
 
-class SwingingAngle final : public SmoothTerm {
+class SwingingAngle final : public HeadInDwell {
  public:
-  explicit SwingingAngle(double HeadGeometry::*angle) : angle_(angle) {}
+  using HeadInDwell::HeadInDwell;
 
-  std::string id() const override { return "unlisted:t_in_pose:geometry"; }
-  const std::string& driver() const override { return driver_; }
-  TermForm form() const override { return TermForm::geometry; }
-  std::string shape() const override {
-    return "sine" + Target{.form = TermForm::geometry, .angle = angle_}.words();
-  }
-  Subject subject() const override { return Subject::head; }
-  bool within_dwell() const override { return true; }
   std::vector<ParameterInfo> parameters() const override {
     return {{"amplitude", "deg", ParameterRole::amplitude},
             effect::line_frequency(),
             effect::line_phase()};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    const auto& line = angle_ == &HeadGeometry::delta_rad ? log.delta_line : log.h_line;
+    const auto& line = is_delta() ? log.delta_line : log.h_line;
     if (!line || !line->steady) return {};
     return {{{effect::kSmallAngle_deg, line->f_hz, effect::start_of_phase_deg(*line)}}};
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*angle_ += p[0] * kRadPerDeg * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
+    head.*angle() += p[0] * kRadPerDeg * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    return {angle_, p[0] * kRadPerDeg * effect::sine(log.visits[visit], p[1], p[2])};
+    return {angle(), p[0] * kRadPerDeg * effect::sine(log.visits[visit], p[1], p[2])};
   }
   void normalise(std::vector<double>& p) const override { effect::normalise_sine(p[0], p[2]); }
 
  private:
-  double HeadGeometry::*angle_;
-  std::string driver_ = "t_in_pose";
+  std::string function() const override { return "sine"; }
 };
 
 class LineOfColumn final : public SmoothTerm {

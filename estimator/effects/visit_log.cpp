@@ -190,6 +190,10 @@ void set_directions(VisitLog& log) {
 
 }  // namespace
 
+double shorter_turn_rad(const Visit& from, const Visit& to) {
+  return std::remainder(commanded_turn_rad(from, to), 2 * std::numbers::pi);
+}
+
 std::array<int, 3> direction_after(const Visit& before, double delta_rad) {
   constexpr double kStill_rad = 1e-9;  // degrees that became radians and came back
   std::array<int, 3> direction = before.delta_direction;

@@ -110,6 +110,13 @@ enum class BetweenSets { nowhere, home, anywhere };
 /// column of the log.
 void put_in_front(const RunHistory& history, BetweenSets head, VisitLog& log);
 
+/// From one visit to another: the shorter turn of δ, and the one that was commanded, of a head that
+/// does not pass from 360° to 0°.
+double shorter_turn_rad(const Visit& from, const Visit& to);
+inline double commanded_turn_rad(const Visit& from, const Visit& to) {
+  return to.delta_rad - from.delta_rad;
+}
+
 /// Visit::delta_direction of a visit at `delta_rad` that comes next after `before`.
 std::array<int, 3> direction_after(const Visit& before, double delta_rad);
 
