@@ -46,15 +46,17 @@ bool same_effect(const Candidate& a, const Candidate& b) {
 /// With Schwarz's approximation of its odds. Where the readings hardly tell a size from none or an
 /// endless one, it is on its way to a limit in which it is what was found by another name: a
 /// warm-up that has hardly begun at the end of the run is a drift, from a zero that may lie
-/// anywhere. That has no odds.
-Alternative alternative(std::string name, EnlargedFit rival, const EnlargedFit& found) {
+/// anywhere. That has no odds. `handicap`: of the rival beyond that of what was found.
+Alternative alternative(std::string name, EnlargedFit rival, const EnlargedFit& found,
+                        double handicap = 0) {
   const auto further =
       static_cast<double>(rival.parameters.free_count() - found.parameters.free_count());
-  const double behind = rival.chi2 - found.chi2 + kPricePerParameter * further;
+  const double behind =
+      rival.chi2 - found.chi2 + kPricePerParameter * further + 2 * std::max(handicap, 0.0);
   constexpr double kHardly = 0.5;  // standard uncertainties of the size
   const double odds =
       leaves_a_size_open(rival, kHardly) ? 0 : std::exp(-0.5 * std::max(0.0, behind));
-  return {std::move(name), std::move(rival), odds};
+  return {std::move(name), std::move(rival), odds, true};
 }
 
 /// By how much the free parameters of `found` are others in a model with something else in the
@@ -171,11 +173,15 @@ std::vector<Alternative> that_do_as_well(const Vacancy& vacancy, const std::vect
     const Eigen::Index free =
         std::max(fits[k].parameters.free_count(), vacancy.result.fit.parameters.free_count());
     if (vacancy.without.chi2 - fits[k].chi2 < vacancy.needed(free)) continue;
-    const std::string id = vacancy.list.candidates[rivals[k].candidate].effect->id();
-    if (id != vacancy.found.effect->id() &&
-        std::none_of(alternatives.begin(), alternatives.end(),
-                     [&](const Alternative& other) { return other.name == id; }))
-      alternatives.push_back(alternative(id, std::move(fits[k]), vacancy.result.fit));
+    const Candidate& rival = vacancy.list.candidates[rivals[k].candidate];
+    const std::string id = rival.effect->id();
+    if (id == vacancy.found.effect->id() ||
+        std::any_of(alternatives.begin(), alternatives.end(),
+                    [&](const Alternative& other) { return other.name == id; }))
+      continue;
+    alternatives.push_back(alternative(id, std::move(fits[k]), vacancy.result.fit,
+                                       rival.handicap - vacancy.found.handicap));
+    alternatives.back().has_name = rival.has_name();
   }
   std::stable_sort(
       alternatives.begin(), alternatives.end(),
@@ -240,8 +246,12 @@ std::vector<Alternative> named_rivals(const Vacancy& vacancy) {
   return {};
 }
 
-/// Functions of another driver, or of another form: the likeliest of each.
+/// Functions of another driver, or of another form: the likeliest of each. In the place of a name
+/// those with no more parameters than it has.
 std::vector<Alternative> other_structures(const Vacancy& vacancy) {
+  const auto allowed = vacancy.found.has_name() ? vacancy.result.fit.parameters.free_count() -
+                                                      vacancy.without.parameters.free_count()
+                                                : std::numeric_limits<Eigen::Index>::max();
   const auto candidate_of = [&](const Rival& rival) -> const Candidate& {
     return vacancy.list.candidates[rival.candidate];
   };
@@ -258,7 +268,9 @@ std::vector<Alternative> other_structures(const Vacancy& vacancy) {
   std::vector<Rival> likeliest;
   for (const Rival& rival : vacancy.ranked) {
     const Candidate& candidate = candidate_of(rival);
-    if (candidate.has_name() || !vacancy.may_do(rival) || is_there(candidate)) continue;
+    if (candidate.has_name() || vacancy.gains.dof(rival.candidate) > allowed ||
+        !vacancy.may_do(rival) || is_there(candidate))
+      continue;
     const auto same = std::find_if(likeliest.begin(), likeliest.end(), [&](const Rival& other) {
       return candidate_of(other).effect->id() == candidate.effect->id();
     });
@@ -283,9 +295,7 @@ std::vector<Alternative> find_alternatives(const SearchInput& input, const Candi
     return proven_rivals(input, list, result, base, found);
   const Vacancy vacancy(input, list, result, found, base);
   std::vector<Alternative> rivals = named_rivals(vacancy);
-  if (!found.has_name()) {
-    for (Alternative& other : other_structures(vacancy)) rivals.push_back(std::move(other));
-  }
+  for (Alternative& other : other_structures(vacancy)) rivals.push_back(std::move(other));
   const bool is_there =
       std::any_of(result.evidence.begin(), result.evidence.end(),
                   [](const Evidence& e) { return e.candidate.effect->of_the_room(); });

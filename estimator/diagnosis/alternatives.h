@@ -13,6 +13,7 @@ struct Alternative {
   std::string name;  ///< an id, or several joined by "+"
   EnlargedFit fit;   ///< the model with it in place of the effect, its own effects last
   double odds = 0;   ///< against what was found, which the search preferred: at most 1
+  bool has_name = true;
 };
 
 /// Explanations that these data cannot tell from effect `index` of the result, most likely first.
@@ -20,8 +21,8 @@ struct Alternative {
 ///
 /// A rival counts when replacing the effect by it costs less likelihood than noise would
 /// (`kIndistinguishable` in χ², more for every further parameter). Sums are looked for only as long
-/// as a single rival does not do. What has a name has no rivals without one, which can imitate
-/// anything; what has none has functions of other drivers and of other forms, too.
+/// as a single rival does not do. Functions of other drivers and of other forms count, too, but
+/// beside a name only with no more parameters: with more they can imitate anything.
 std::vector<Alternative> find_alternatives(const SearchInput& input, const CandidateList& list,
                                            const SearchResult& result, std::size_t index);
 

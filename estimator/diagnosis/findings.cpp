@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "estimator/diagnosis/detection_limits.h"
+#include "estimator/diagnosis/separating_design.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/parallel_for.h"
 
@@ -205,6 +206,21 @@ void attach(const std::vector<EffectParameter>& batch, const std::vector<EffectP
   }
 }
 
+/// In the place of a name, structures count where some poses would tell them from it: what does the
+/// same wherever the head goes is the same, said with more words.
+void keep_what_poses_tell(const SearchInput& input, const SearchResult& search,
+                          const HeadReach& reach, std::vector<Alternative>& alternatives) {
+  const auto first = std::stable_partition(alternatives.begin(), alternatives.end(),
+                                           [](const Alternative& each) { return each.has_name; });
+  std::vector<Alternative> structures(std::make_move_iterator(first),
+                                      std::make_move_iterator(alternatives.end()));
+  alternatives.erase(first, alternatives.end());
+  if (structures.empty()) return;
+  const std::vector<double> most = best_proposal(input, search, structures, reach).most;
+  for (std::size_t k = 0; k < structures.size(); ++k)
+    if (most[k] >= kDecided) alternatives.push_back(std::move(structures[k]));
+}
+
 }  // namespace
 
 std::vector<Rivals> find_rivals(const SearchInput& input, const CandidateList& list,
@@ -212,6 +228,8 @@ std::vector<Rivals> find_rivals(const SearchInput& input, const CandidateList& l
   std::vector<Rivals> rivals(search.evidence.size());
   parallel_for(rivals.size(), [&](std::size_t e) {
     rivals[e].alternatives = find_alternatives(input, list, search, e);
+    if (search.evidence[e].candidate.has_name())
+      keep_what_poses_tell(input, search, reach, rivals[e].alternatives);
     rivals[e].separation = separate(input, search, e, rivals[e].alternatives, reach);
   });
   return rivals;

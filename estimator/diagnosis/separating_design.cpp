@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <tuple>
 #include <utility>
@@ -279,6 +280,21 @@ std::vector<Stop> within(const HeadReach& reach) {
   return stops;
 }
 
+/// As many of the stops in random order, each at a height of its own: what remembers where the head
+/// came from may differ only after short ways.
+std::vector<Stop> at_random(std::vector<Stop> stops, std::size_t most) {
+  std::mt19937_64 random(1);
+  // std::shuffle may differ between libraries; this does not.
+  for (std::size_t k = stops.size(); k-- > 1;) std::swap(stops[k], stops[random() % (k + 1)]);
+  if (stops.size() > most) stops.resize(most);
+  const auto [low, high] = std::minmax_element(
+      stops.begin(), stops.end(), [](const Stop& a, const Stop& b) { return a.h_deg < b.h_deg; });
+  const double bottom_deg = low->h_deg;
+  const auto whole_degrees = static_cast<std::uint64_t>(high->h_deg - bottom_deg) + 1;
+  for (Stop& stop : stops) stop.h_deg = bottom_deg + static_cast<double>(random() % whole_degrees);
+  return stops;
+}
+
 /// Ring by ring, to and fro.
 void sort_for_travel(std::vector<Stop>& stops) {
   std::sort(stops.begin(), stops.end(), [](const Stop& a, const Stop& b) {
@@ -316,12 +332,7 @@ Proposal best_proposal(const SearchInput& input, const SearchResult& result,
     best = std::move(trial);
   };
   const std::vector<Stop> chosen = design.greedy(possible, kMost);
-  std::vector<Stop> shuffled = possible;
-  std::mt19937_64 random(1);
-  // std::shuffle may differ between libraries; this does not.
-  for (std::size_t k = shuffled.size(); k-- > 1;)
-    std::swap(shuffled[k], shuffled[random() % (k + 1)]);
-  if (shuffled.size() > kMost) shuffled.resize(kMost);
+  const std::vector<Stop> shuffled = at_random(possible, kMost);
   std::vector<Stop> to_and_fro;
   if (chosen.size() >= 2)
     for (std::size_t k = 0; k < kMost; ++k) to_and_fro.push_back(chosen[k % 2]);

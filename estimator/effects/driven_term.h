@@ -106,6 +106,7 @@ class DrivenTerm : public SmoothTerm {
   std::vector<double> beginnings() const {
     constexpr double kSoonAfter = 0.1;  // as a share of the run
     const auto [low, high] = range_;
+    if (driver_->span) return {0};  // about which it lies
     std::vector<double> found = {low};
     if (driver_->is_clock() && low > 0 && low < kSoonAfter * (high - low)) found.push_back(0);
     return found;

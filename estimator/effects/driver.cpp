@@ -7,10 +7,13 @@
 #include <numeric>
 #include <set>
 
+#include "estimator/effects/effect.h"
 #include "estimator/kinematics.h"
 
 namespace plumbline {
 namespace {
+
+constexpr const char* kCosineOfH = "cosine of h";
 
 using ValueAtVisit = std::function<double(std::size_t visit)>;
 
@@ -147,9 +150,9 @@ std::string Driver::unit() const {
     if (column == kTemperatureColumn) of_column = "K";
     return of_column.empty() || !is_rate() ? of_column : of_column + "/h";
   }
-  if (two_valued) return "";
+  if (two_valued || past == kCosineOfH) return "";
   if (past.find("time") != std::string::npos) return "s";
-  if (past.find("turn of delta") != std::string::npos || past.find("of h") != std::string::npos)
+  if (past.find("of delta") != std::string::npos || past.find("of h") != std::string::npos)
     return "rad";
   return component || name == "previous_pose" ? "g" : "";
 }
@@ -232,15 +235,10 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   PerAxis<std::vector<double>> size_g = changes_g(log);
   for (std::vector<double>& of_axis : size_g)
     for (double& value : of_axis) value = std::abs(value);
-  const auto size_rad =
-      for_all_axes(log, [&](std::size_t k) { return std::abs(turn_rad(log, k)); });
+  std::vector<Driver> ways = lengths_of_ways(log);
   const auto plain_size_rad = for_all_axes(log, [&](std::size_t k) {
     const Visit* before = log.before(k);
     return before ? std::abs(commanded_turn_rad(*before, log.visits[k])) : 0;
-  });
-  const auto size_of_h_rad = for_all_axes(log, [&](std::size_t k) {
-    const Visit* before = log.before(k);
-    return before ? std::abs(log.visits[k].h_rad - before->h_rad) : 0;
   });
   const auto way_s = for_all_axes(log, [&](std::size_t k) {
     const Visit* before = log.before(k);
@@ -248,9 +246,9 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   });
   std::vector<Driver> drivers = {
       {"previous_pose", "size of the change of a_i since", std::move(size_g)},
-      {"previous_pose", "size of the turn of delta since", size_rad},
+      {"previous_pose", "size of the turn of delta since", std::move(ways[0].value)},
       {"previous_pose", "size of the turn of delta within 360 degrees since", plain_size_rad},
-      {"previous_pose", "size of the change of h since", size_of_h_rad},
+      {"previous_pose", "size of the change of h since", std::move(ways[1].value)},
       {"previous_pose", "time on the way", way_s}};
   for (Driver& driver : drivers) driver.span = about_zero(driver.value);
   return drivers;
@@ -277,6 +275,33 @@ Driver load(const VisitLog& log) {
 
 std::vector<Driver> loads_of_others(const VisitLog& log) {
   return of_other_axes(load(log), "", "");
+}
+
+Driver sign_of_load(const VisitLog& log) {
+  Driver driver = load(log);
+  driver.past = "sign of a_i";
+  driver.two_valued = true;
+  for (std::vector<double>& of_axis : driver.value) {
+    double before = 1;
+    for (double& value : of_axis)
+      before = value = effect::is_nearly_zero(value) ? before : std::copysign(1, value);
+  }
+  return driver;
+}
+
+std::vector<Driver> lengths_of_ways(const VisitLog& log) {
+  const auto of_delta = [&](std::size_t k) { return std::abs(turn_rad(log, k)); };
+  const auto of_h = [&](std::size_t k) {
+    const Visit* before = log.before(k);
+    return before ? std::abs(log.visits[k].h_rad - before->h_rad) : 0;
+  };
+  return {{"previous_pose", "turns of delta", for_all_axes(log, of_delta)},
+          {"previous_pose", "turns of h", for_all_axes(log, of_h)}};
+}
+
+Driver weight_across(const VisitLog& log) {
+  return {"previous_pose", kCosineOfH,
+          for_all_axes(log, [&](std::size_t k) { return std::cos(log.visits[k].h_rad); })};
 }
 
 }  // namespace plumbline

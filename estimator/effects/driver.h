@@ -74,4 +74,13 @@ Driver load(const VisitLog& log);
 /// The same of the next axis and of the one after that.
 std::vector<Driver> loads_of_others(const VisitLog& log);
 
+/// Its sign; where it is nothing, what it was before.
+Driver sign_of_load(const VisitLog& log);
+
+/// How far δ and h turned on the way to each visit.
+std::vector<Driver> lengths_of_ways(const VisitLog& log);
+
+/// The cosine of h.
+Driver weight_across(const VisitLog& log);
+
 }  // namespace plumbline

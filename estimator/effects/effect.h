@@ -231,6 +231,8 @@ double mean_of_sine(const Visit& visit, double f_hz, double phase_deg);
 Eigen::VectorXd sine(const Visit& visit, double f_hz, double phase_deg);
 /// A positive amplitude, a phase within one turn.
 void normalise_sine(double& amplitude, double& phase_deg);
+/// Whether a component of the specific force, g, is zero but for rounding.
+inline bool is_nearly_zero(double a_g) { return std::abs(a_g) < 1e-9; }
 /// `count` values from `first` to `last` in equal ratios.
 std::vector<double> geometric(double first, double last, int count);
 /// Share of Gaussian noise of standard deviation `sd` about `value` that lies below `edge`; with no

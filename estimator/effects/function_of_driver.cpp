@@ -253,6 +253,8 @@ class Wave final : public DrivenTerm {
  private:
   std::string function() const override { return "wave"; }
   double at(double value, const double* p) const override {
+    constexpr double kOnTheEdge = 0.99;
+    if (p[1] < kOnTheEdge * shortest_) return 0;  // the fit would end at an alias of a longer one
     const double phase = 2 * std::numbers::pi * (value - p[0]) / p[1];
     return p[2] * std::cos(phase) + p[3] * std::sin(phase);
   }
@@ -316,17 +318,25 @@ class Power final : public DrivenTerm {
   using DrivenTerm::DrivenTerm;
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"start", variable().unit(), ParameterRole::index},
-            {"end", variable().unit(), ParameterRole::index},
-            {"power", "", ParameterRole::shape},
-            {"p", target().unit(), ParameterRole::amplitude}};
+    std::vector<ParameterInfo> infos = {{"start", variable().unit(), ParameterRole::index},
+                                        {"end", variable().unit(), ParameterRole::index},
+                                        {"power", "", ParameterRole::shape},
+                                        {"p", target().unit(), ParameterRole::amplitude}};
+    if (!target().mean_in_the_twelve())
+      infos.push_back({"p0", target().unit(), ParameterRole::amplitude});
+    return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    const double high = range().second;
+    const double high = range().second, size = target().typical_size();
     std::vector<Hypothesis> starts;
     for (const double beginning : beginnings())
-      for (const double power : {0.5, 2.0})
-        starts.push_back({{beginning, high, power, target().typical_size()}});
+      for (const double power : {0.5, 2.0}) {
+        if (target().mean_in_the_twelve())
+          starts.push_back({{beginning, high, power, size}});
+        else
+          for (const double mean : {0.0, size})
+            starts.push_back({{beginning, high, power, size, mean}});
+      }
     return starts;
   }
 
@@ -334,7 +344,8 @@ class Power final : public DrivenTerm {
   std::string function() const override { return "power"; }
   double at(double value, const double* p) const override {
     const double share = (value - p[0]) / (p[1] - p[0]);
-    return share > 0 && p[2] > 0 ? p[3] * std::pow(share, p[2]) : 0;
+    const double mean = target().mean_in_the_twelve() ? 0 : p[4];
+    return mean + (share > 0 && p[2] > 0 ? p[3] * std::pow(share, p[2]) : 0);
   }
 };
 

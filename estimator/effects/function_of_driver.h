@@ -107,7 +107,8 @@ std::unique_ptr<SmoothTerm> saw_tooth(DriverPointer driver, const Target& target
 /// and amplitude.
 bool is_saw_tooth(const Effect& effect);
 /// Nothing on one side of an unknown value, proportional to the distance from it on the other; of a
-/// component of the specific force also nothing up to an unknown size on both sides.
+/// component of the specific force, and of a change, also nothing up to an unknown size on both
+/// sides.
 std::unique_ptr<SmoothTerm> bend(DriverPointer driver, const Target& target);
 /// There where one bit of the code is set, `adc` saying how large bits are; without it none are
 /// looked for.
@@ -123,6 +124,8 @@ std::unique_ptr<SmoothTerm> gain_beyond(DriverPointer component, const Target& t
 /// From one side to the other twice a turn, at an unknown angle and over an unknown part of it: a
 /// load that is thrown across a play.
 std::unique_ptr<SmoothTerm> thrown(DriverPointer angle, const Target& target);
+/// Half a wave over half of the turn and nothing over the other: what presses to one side only.
+std::unique_ptr<SmoothTerm> half_wave(DriverPointer angle, const Target& target);
 /// From nothing to all of it about an unknown value (logistic function).
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge);
 /// What dies away with the time, by an unknown time constant.
@@ -145,6 +148,17 @@ std::unique_ptr<SmoothTerm> relay(DriverPointer driver, const Target& target);
 /// A harmonic of an angle, with amplitude and phase in a straight line of the driver.
 std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                 const Target& target);
+/// A field fixed to the base, as env.base_field, whose strength follows the driver in a straight
+/// line.
+std::unique_ptr<SmoothTerm> line_times_field(DriverPointer driver, DriverPointer delta,
+                                             DriverPointer h, const Target& target);
+/// With the sign of a two-valued driver: at once when it changes, then dying away by an unknown
+/// time constant.
+std::unique_ptr<SmoothTerm> fading_reversal(DriverPointer direction, DriverPointer clock,
+                                            const Target& target);
+/// The same in every visit, but all of it dies away with the time from the first pose on.
+std::unique_ptr<SmoothTerm> fading_direction(DriverPointer direction, DriverPointer clock,
+                                             const Target& target);
 /// A straight line of the driver between two values of an angle, and nothing elsewhere.
 std::unique_ptr<SmoothTerm> line_in_a_part(DriverPointer driver, DriverPointer angle,
                                            const Target& target);

@@ -85,7 +85,9 @@ class LineTimesLine final : public DrivenTerm {
             {"p11", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<std::string> columns() const override {
-    return {recorded_column(variable().name), recorded_column(other_->name)};
+    std::vector<std::string> columns = variable().columns();
+    for (std::string& column : other_->columns()) columns.push_back(std::move(column));
+    return columns;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
@@ -105,6 +107,43 @@ class LineTimesLine final : public DrivenTerm {
   }
 
   DriverPointer other_;
+};
+
+/// What turns under the triad as the earth's field does, only not always as strong.
+class LineTimesField final : public DrivenTerm {
+ public:
+  LineTimesField(DriverPointer driver, DriverPointer delta, DriverPointer h, Target target)
+      : DrivenTerm(std::move(driver), target), delta_(std::move(delta)), h_(std::move(h)) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
+            {"m1_0", "g", ParameterRole::amplitude},
+            {"m2_0", "g", ParameterRole::amplitude},
+            {"m1_1", "g", ParameterRole::amplitude},
+            {"m2_1", "g", ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
+    const auto [low, high] = range();
+    if (!(high > low)) return {};
+    const double m1 = target().typical_size();
+    const double m2 = axis == 2 ? 0 : m1;  // the spindle axis never sees y_b
+    return {{{low, high, 0, 0, m1, m2}}, {{low, high, m1, m2, m1, m2}}};
+  }
+
+ private:
+  std::string function() const override { return "straight line, times a field of the base"; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double x = position(variable().value[axis][visit], p[0], p[1]);
+    const double delta_rad = delta_->value[axis][visit], h_rad = h_->value[axis][visit];
+    // x_b and y_b seen along the axis.
+    const std::array x_b = {-std::sin(h_rad) * std::cos(delta_rad),
+                            std::sin(h_rad) * std::sin(delta_rad), std::cos(h_rad)};
+    const std::array y_b = {-std::sin(delta_rad), -std::cos(delta_rad), 0.0};
+    return (p[2] + p[4] * x) * x_b[axis] + (p[3] + p[5] * x) * y_b[axis];
+  }
+
+  DriverPointer delta_, h_;
 };
 
 /// A straight line in one part of an angle's range and nothing elsewhere: what happens at a place
@@ -230,6 +269,11 @@ std::unique_ptr<SmoothTerm> line_in_a_part(DriverPointer driver, DriverPointer a
 std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer other,
                                             const Target& target) {
   return std::make_unique<LineTimesLine>(std::move(driver), std::move(other), target);
+}
+std::unique_ptr<SmoothTerm> line_times_field(DriverPointer driver, DriverPointer delta,
+                                             DriverPointer h, const Target& target) {
+  return std::make_unique<LineTimesField>(std::move(driver), std::move(delta), std::move(h),
+                                          target);
 }
 std::unique_ptr<SmoothTerm> harmonic_times_harmonic(DriverPointer angle, DriverPointer other,
                                                     const Target& target) {

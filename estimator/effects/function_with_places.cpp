@@ -32,7 +32,7 @@ class Bend final : public DrivenTerm {
       // The two sides differ by a straight line.
       if (!is_in_the_twelve()) starts.push_back({{low, high, -1, at, target().typical_size()}});
     }
-    if (!variable().component) {
+    if (!variable().component && !variable().span) {
       for (int k = 1; k < kParts; ++k)
         starts.push_back(
             {{low, high, kValley, low + (high - low) * k / kParts, target().typical_size()}});
@@ -181,6 +181,43 @@ class Thrown final : public DrivenTerm {
   }
 };
 
+/// What presses to one side only.
+class HalfWave final : public DrivenTerm {
+ public:
+  using DrivenTerm::DrivenTerm;
+
+  std::vector<ParameterInfo> parameters() const override {
+    constexpr double kFine_rad = 0.1 * kRadPerDeg;
+    std::vector<ParameterInfo> infos = {
+        {"middle", "rad", ParameterRole::shape, kFine_rad, true},
+        {.name = "p", .unit = target().unit(), .role = ParameterRole::amplitude, .needed = true}};
+    if (!target().mean_in_the_twelve())
+      infos.push_back({"p0", target().unit(), ParameterRole::amplitude});
+    return infos;
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 12;
+    const double size = target().typical_size();
+    std::vector<Hypothesis> starts;
+    for (int k = 0; k < kParts; ++k) {
+      std::vector<double> p = {effect::kTurn_rad * k / kParts, size};
+      if (!target().mean_in_the_twelve()) p.push_back(0);
+      starts.push_back({p});
+      if (target().mean_in_the_twelve()) continue;
+      p.back() = size;
+      starts.push_back({std::move(p)});
+    }
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "half a wave"; }
+  double at(double value, const double* p) const override {
+    const double mean = target().mean_in_the_twelve() ? 0 : p[2];
+    return mean + p[1] * std::max(0.0, std::cos(value - p[0]));
+  }
+};
+
 class Step final : public DrivenTerm {
  public:
   Step(DriverPointer driver, Target target, StepEdge edge)
@@ -269,6 +306,9 @@ std::unique_ptr<SmoothTerm> gain_beyond(DriverPointer component, const Target& t
 }
 std::unique_ptr<SmoothTerm> thrown(DriverPointer angle, const Target& target) {
   return std::make_unique<Thrown>(std::move(angle), target);
+}
+std::unique_ptr<SmoothTerm> half_wave(DriverPointer angle, const Target& target) {
+  return std::make_unique<HalfWave>(std::move(angle), target);
 }
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge) {
   return std::make_unique<Step>(std::move(driver), target, edge);

@@ -51,13 +51,30 @@ std::vector<double> average_of_the_past(const VisitLog& log, const std::vector<d
   return average;
 }
 
-enum class MemoryOf { average, rest, square };
+/// What every visit adds to, and what fades from then on.
+std::vector<double> fading_sum(const VisitLog& log, const std::vector<double>& added,
+                               double tau_s) {
+  std::vector<double> sums(added.size());
+  double sum = 0, since_s = 0;
+  for (std::size_t k = 0; k < added.size(); ++k) {
+    const Visit& visit = log.visits[k];
+    sum = sum * std::exp((since_s - visit.t_arrival_s) / tau_s) + added[k];
+    since_s = visit.t_arrival_s;
+    sums[k] = sum * effect::mean_decay(visit, since_s, tau_s);
+  }
+  return sums;
+}
 
-/// One variable and its averages, what it is above them, or the averages of its square.
+enum class MemoryOf { average, rest, square, sign, sum };
+
+/// One variable and its averages, what it is above them, the averages of its square or sign, or its
+/// fading sum.
 class Memory {
  public:
   Memory(const DriverPointer& driver, MemoryOf of, const VisitLog& log)
-      : driver_(of == MemoryOf::square ? squared(*driver) : driver),
+      : driver_(of == MemoryOf::square ? squared(*driver)
+                : of == MemoryOf::sign ? sign_of(*driver)
+                                       : driver),
         name_(driver_->name + (of == MemoryOf::rest && driver_->recorded ? ".rate" : "")),
         of_(of),
         log_(log) {
@@ -68,10 +85,18 @@ class Memory {
 
   const std::string& name() const { return name_; }
   bool is_of_column() const { return driver_->recorded; }
-  std::string unit() const { return driver_->unit() + (of_ == MemoryOf::square ? "^2" : ""); }
+  std::string unit() const {
+    if (of_ == MemoryOf::sign) return "";
+    return driver_->unit() + (of_ == MemoryOf::square ? "^2" : "");
+  }
   std::string words() const {
-    return std::string(vanishes_at_rest() ? "the change from " : "") + "the average of the past" +
-           (of_ == MemoryOf::square ? " of its square" : "");
+    const std::string& past = driver_->past;
+    return std::string(vanishes_at_rest() ? "the change from " : "") +
+           (of_ == MemoryOf::sum ? "the fading sum" : "the average of the past") +
+           (of_ == MemoryOf::square ? " of its square"
+            : of_ == MemoryOf::sign ? " of its sign"
+                                    : "") +
+           (past.empty() ? "" : " of the " + past);
   }
   bool is_shown() const { return of_ != MemoryOf::square || shows_square_; }
   std::vector<std::string> columns() const { return driver_->columns(); }
@@ -113,7 +138,9 @@ class Memory {
     for (const double tau_s : time_constants_s()) {
       auto& averages = table_.emplace_back();
       for (std::size_t source = 0; source < sources(); ++source)
-        averages.push_back(average_of_the_past(log_, driver_->value[source], between, tau_s));
+        averages.push_back(of_ == MemoryOf::sum
+                               ? fading_sum(log_, driver_->value[source], tau_s)
+                               : average_of_the_past(log_, driver_->value[source], between, tau_s));
     }
   }
 
@@ -123,6 +150,12 @@ class Memory {
     const std::vector<double>& value = driver.value[0];
     driver.reference =
         std::accumulate(value.begin(), value.end(), 0.0) / static_cast<double>(value.size());
+    return shared(std::move(driver));
+  }
+  static DriverPointer sign_of(Driver driver) {
+    for (auto& of_axis : driver.value)
+      for (double& value : of_axis)
+        value = effect::is_nearly_zero(value) ? 0 : std::copysign(1, value);
     return shared(std::move(driver));
   }
 
@@ -135,6 +168,8 @@ class Memory {
   mutable std::once_flag once_;
   mutable std::vector<std::vector<std::vector<double>>> table_;  // by time constant
 };
+
+constexpr Target kBias{};
 
 class MemoryTerm final : public SmoothTerm {
  public:
@@ -246,10 +281,17 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
     for (const Target& target : {kDelta, kH, kRoll}) terms.push_back(of(target));
     terms.push_back(towards_a_direction(of(kTilt)));
   }
-  for (const DriverPointer& column : columns)
-    terms.push_back(
-        std::make_unique<MemoryTerm>(std::make_shared<const Memory>(column, MemoryOf::square, log),
-                                     Target{TermForm::bias}, longest_s));
+  const auto add = [&](const DriverPointer& driver, MemoryOf of, const Target& target) {
+    terms.push_back(std::make_unique<MemoryTerm>(std::make_shared<const Memory>(driver, of, log),
+                                                 target, longest_s));
+  };
+  for (const DriverPointer& column : columns) add(column, MemoryOf::square, kBias);
+  if (!attitude->varies()) return terms;
+  // What it draws heats; where it rests, charges gather; what it warms on one side bends.
+  for (const MemoryOf of : {MemoryOf::square, MemoryOf::sign}) add(attitude, of, kBias);
+  for (Driver& other : loads_of_others(log)) add(shared(std::move(other)), MemoryOf::rest, kBias);
+  for (Driver& ways : lengths_of_ways(log)) add(shared(std::move(ways)), MemoryOf::sum, kBias);
+  add(shared(weight_across(log)), MemoryOf::average, kH);
   return terms;
 }
 

@@ -12,9 +12,11 @@ namespace plumbline {
 /// Proportional to the average of the past with weight exp(−age/τ), τ unknown: of every recorded
 /// column, of a column less its average, which is its rate without the noise of a slope, and of the
 /// specific force of the own axis less its average, which is nothing at rest; added to the bias and
-/// to the scale, of columns also to the angles of head and base; and of the square of a column that
-/// takes both signs (what a current heats), added to the bias. With and without a beginning that
-/// differs from what the first visit shows.
+/// to the scale, of columns also to the angles of head and base; of the square of a column that
+/// takes both signs (what a current heats), of square and sign of the own axis's specific force, of
+/// that of another axis less its average, and the fading sum of the ways of the head, added to the
+/// bias; of the weight across the arm, added to h. With and without a beginning that differs from
+/// what the first visit shows.
 ///
 /// No τ beyond `longest_s`: what hardly changes over a run is not to be told from the 12
 /// parameters.

@@ -90,11 +90,15 @@ class TermList {
              [&](const DriverPointer& driver) { add(friction(driver, kBias)); });
     for_each(changes_of_others(log_), add_line);
     for_each(sizes_of_changes(log_), [&](const DriverPointer& driver) {
-      for (const Target& target : {kBias, kDelta, kH}) add_polynomials(driver, target, {1});
+      for (const Target& target : {kBias, kDelta, kH}) {
+        add_polynomials(driver, target, {1});
+        add(power(driver, target));
+      }
     });
     for_each({component_before(log_)},
              [&](const DriverPointer& driver) { add_polynomials(driver, kScale, {1}); });
     add_of_wound_up_spindle();
+    add_of_directions();
     const auto attitude = shared(load(log_));
     if (any_ || attitude->varies()) {
       add(play(attitude, kBias, OfPlay::lag));
@@ -171,6 +175,7 @@ class TermList {
     if (clock || column)
       for (const Target& target : {kBias, kScale}) add(bend(driver, target));
     if (column) add_of_column(driver);
+    if (driver->past == "change of a_i since") add(bend(driver, kBias));
     if (driver->is_rate()) {
       add_steps(driver, kBias);
       rates_.push_back(driver);
@@ -258,6 +263,7 @@ class TermList {
       add(sector(angle, target));
     }
     for (const Target& target : {kRoll, kSkew}) add_polynomials(angle, target, {1, 2});
+    for (const Target& target : {kBias, kDelta, kH, kRoll}) add(half_wave(angle, target));
   }
   /// From the second harmonic of the turn that is seen in part; the first is a listed effect.
   void add_harmonics_of_h(const DriverPointer& h) {
@@ -306,6 +312,9 @@ class TermList {
       if (!angles_.empty() && angles_[0]->angle)
         add(line_times_harmonic(direction, angles_[0], kDelta));
     // What the weight does to a wheel grows with its moment about the axis, which need be no line.
+    if (angles_.size() == 2)
+      for (const DriverPointer& driver : followed)
+        if (driver != angles_[1]) add(line_times_field(driver, angles_[0], angles_[1], kBias));
     if (angles_.size() == 2) add(parabola_times_harmonic(angles_[1], angles_[0], kDelta));
     for (std::size_t one = 0; one < columns_.size(); ++one)
       for (std::size_t other = one + 1; other < columns_.size(); ++other)
@@ -320,6 +329,19 @@ class TermList {
     add(saw_tooth(turn, kDelta));
     add(relay(turn, kBias));
     if (angles_.size() == 2) add(line_times_line(turn, angles_[1], kBias));
+  }
+  /// What goes with the direction of the last move, and not always alike.
+  void add_of_directions() {
+    const auto sign = shared(sign_of_load(log_));
+    if (!clock_) return;
+    add(fading_reversal(sign, clock_, kBias));
+    for (const DriverPointer& direction : directions_) {
+      const Target& angle = direction->past.ends_with("of h") ? kH : kDelta;
+      for (const Target& target : {kBias, angle}) add(fading_reversal(direction, clock_, target));
+      add(fading_direction(direction, clock_, angle));
+      for (const DriverPointer& column : columns_) add(line_times_line(direction, column, angle));
+      add(line_times_line(direction, clock_, angle));
+    }
   }
   /// Where something changes while the head rests.
   void add_of_dwells() {

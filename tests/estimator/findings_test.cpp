@@ -369,7 +369,28 @@ TEST(Findings, NothingIsAskedBeyondTheLimitsOfAHead) {
   const FoundEffect& found = limited.diagnosis.effects.front();
   EXPECT_FALSE(found.alternatives.empty());
   EXPECT_THAT(found.separate_by, HasSubstr("mount the triad"));
-  EXPECT_THAT(found.separating_plan.stops, IsEmpty());
+  for (const SeparatingPlan::Stop& stop : found.separating_plan.stops) {
+    EXPECT_GE(stop.h_deg, 0);
+    EXPECT_LE(stop.h_deg, 80);
+  }
+}
+
+// Where temperature and attitude go together, what a temperature does to a bias it may do to the
+// scale by another axis; and what differs only after other ways counts too.
+TEST(Findings, WhatHasNoNameMayStandInThePlaceOfOneWherePosesTell) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.more_V[2] = [lowest = 1.0](const auto& a_g, double) mutable {
+    // Friction of a mass that was only ever drawn up.
+    lowest = std::clamp(lowest, a_g[2] - 0.02, a_g[2] + 0.02);
+    return 0.032 * (lowest - a_g[2]);
+  };
+  const Calibration result = calibrated(synthetic_run(3, kSixteenBits, options));
+  ASSERT_EQ(result.diagnosis.effects.size(), 1u) << result.diagnosis.reason;
+  const FoundEffect& found = result.diagnosis.effects.front();
+  EXPECT_EQ(found.id, "sensor.hysteresis");
+  EXPECT_THAT(found.alternatives, Contains("unlisted:previous_pose:bias"));
 }
 
 // A field along the tilt axis is the same on all axes as a roll of the base.

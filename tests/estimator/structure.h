@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <utility>
 
@@ -39,6 +40,13 @@ inline UnlistedStructure expect_only_structure(const SyntheticRun& data,
 inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
                                                const Structure& expected) {
   return expect_only_structure(synthetic_run(7, kSixteenBits, options), expected);
+}
+
+inline const EffectParameter& parameter(const UnlistedStructure& found, const char* name) {
+  const auto at = std::find_if(found.parameters.begin(), found.parameters.end(),
+                               [&](const EffectParameter& p) { return p.name == name; });
+  EXPECT_NE(at, found.parameters.end()) << name;
+  return *at;
 }
 
 /// What a run of these options would be with a column that was recorded beside it, a function of

@@ -21,13 +21,6 @@ SyntheticOptions fine_turns() {
   return options;
 }
 
-const EffectParameter& parameter(const UnlistedStructure& found, const char* name) {
-  const auto at = std::find_if(found.parameters.begin(), found.parameters.end(),
-                               [&](const EffectParameter& p) { return p.name == name; });
-  EXPECT_NE(at, found.parameters.end()) << name;
-  return *at;
-}
-
 // As a step of h and a step of the base roll.
 TEST(Structure, ABaseTiltsTowardsADirectionOfItsOwn) {
   constexpr double kTilt_deg = 0.8, kDirection_deg = 30;
@@ -228,6 +221,27 @@ TEST(Structure, ADriveThatLagsGoesByItsLastTurn) {
   ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1)) << result.diagnosis.reason;
   EXPECT_EQ(result.diagnosis.unlisted[0].shape,
             "polynomial of degree 1 in the turn of delta within 360 degrees since, added to delta");
+}
+
+// As a roll, a harmonic and a series.
+TEST(Structure, APierThatLeansToOneSideOnlyIsHalfAWave) {
+  SyntheticOptions options = fine_turns();
+  options.roll_error_deg = [](double delta_deg, double) {
+    return 0.3 * std::max(0.0, std::sin((delta_deg - 40) * kRadians));
+  };
+  expect_only_structure(options, {"delta_deg", "geometry", "half a wave, added to the base roll"});
+}
+
+// Positions 10 degrees apart do not tell a period of 120 degrees from one of 9.2.
+TEST(Structure, AFrameThatTwistsWithTheTiltIsNoAliasOfItself) {
+  SyntheticOptions options = fine_turns();
+  options.h_step_deg = 10;
+  options.roll_error_deg = [](double, double h_deg) {
+    return -2.2 * std::sin(3 * h_deg * kRadians);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"h_deg", "geometry", "wave, added to the base roll"});
+  EXPECT_NEAR(parameter(found, "period").value, 120 * kRadians, 5 * kRadians);
 }
 
 }  // namespace

@@ -495,5 +495,20 @@ TEST(Structure, ARangeBeyondAValueHasAZeroOfItsOwn) {
   expect_only_structure(options, {"a_x", "bias", "gain beyond a value"});
 }
 
+// As the column by itself, and a harmonic that follows it.
+TEST(Structure, AFieldThatFollowsAColumnTurnsUnderTheTriad) {
+  const auto field = [](double t_s) { return 45 + 3 * std::sin(t_s / 30) + std::cos(t_s / 11); };
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.random_order = true;
+  options.more_V[1] = [field](const auto& a_g, double t_s) {
+    const double delta_rad = std::atan2(-a_g[1], a_g[0]);
+    const double along = 0.6 * a_g[2] * std::sin(delta_rad) - 0.4 * std::cos(delta_rad);
+    return 2e-4 * (field(t_s) - 45) * along;
+  };
+  expect_only_structure(with_column(options, "mag_uT", field),
+                        {"mag_uT", "bias", "straight line, times a field of the base"});
+}
+
 }  // namespace
 }  // namespace plumbline
