@@ -11,15 +11,12 @@
 namespace plumbline {
 namespace {
 
-/// The last parameter is the direction: 0 tilts as h does, or about y, 90° as the base roll does,
-/// or about x.
+/// The last parameter is the direction: 0 tilts as h does, 90° as the base roll does.
 class BaseTilt final : public SmoothTerm {
  public:
   explicit BaseTilt(std::unique_ptr<SmoothTerm> term)
       : term_(std::move(term)),
-        of_seat_(term_->shape().ends_with(kSeat.words())),
-        function_(
-            term_->shape().substr(0, term_->shape().rfind((of_seat_ ? kSeat : kTilt).words()))) {}
+        function_(term_->shape().substr(0, term_->shape().rfind(kTilt.words()))) {}
 
   std::string id() const override { return term_->id(); }
   const std::string& driver() const override { return term_->driver(); }
@@ -40,14 +37,11 @@ class BaseTilt final : public SmoothTerm {
                      .direction = true});
     return infos;
   }
-  /// Along the axes of the base it is a function of h or of the roll; of the seat it is nothing
-  /// else.
+  /// Along the axes of the base it is a function of h or of the roll.
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    const std::vector<double> directions_deg =
-        of_seat_ ? std::vector{-60.0, 0.0, 60.0} : std::vector{-45.0, 45.0};
     std::vector<Hypothesis> starts;
     for (const Hypothesis& of_term : term_->hypotheses(log, axis))
-      for (const double direction_deg : directions_deg)
+      for (const double direction_deg : {-45.0, 45.0})
         starts.push_back(towards(of_term, direction_deg));
     return starts;
   }
@@ -72,9 +66,8 @@ class BaseTilt final : public SmoothTerm {
                                  const std::vector<std::vector<double>>& p) const override {
     constexpr double kBeside_deg = 20, kRoll_deg = 90;
     std::vector<Hypothesis> found;
-    if (p.size() != 1 || of_seat_) return found;
+    if (p.size() != 1) return found;
     const auto* tilted = dynamic_cast<const BaseTilt*>(&repeated);
-    if (tilted != nullptr && tilted->of_seat_) return found;
     if (tilted != nullptr && tilted != this) {
       if (remembers()) return found;  // a little nearer, but far more than one function
       for (const Hypothesis& of_term : term_->hypotheses(log, axis))
@@ -126,14 +119,11 @@ class BaseTilt final : public SmoothTerm {
   void tilt(const HeadGeometry& by, const double* p, HeadGeometry& head) const {
     const double direction_rad = p[term_->parameters().size()] * kRadPerDeg;
     const double cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
-    const auto along = of_seat_ ? &HeadGeometry::seat_y_rad : &HeadGeometry::h_rad;
-    const auto across = of_seat_ ? &HeadGeometry::seat_x_rad : &HeadGeometry::roll_rad;
-    head.*along += by.*along * cosine;
-    head.*across += by.*along * sine;
+    head.h_rad += by.h_rad * cosine;
+    head.roll_rad += by.h_rad * sine;
   }
 
   std::unique_ptr<SmoothTerm> term_;
-  bool of_seat_;
   std::string function_;  ///< without what it acts on
 };
 

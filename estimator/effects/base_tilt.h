@@ -1,5 +1,4 @@
-// What tilts the base, or the triad in its seat, towards a direction that lies nowhere near an
-// axis.
+// What tilts the base towards a direction that lies nowhere near an axis.
 #pragma once
 
 #include <memory>
@@ -8,10 +7,9 @@
 
 namespace plumbline {
 
-/// `term`, shared between h and the base roll, or between the seat's two angles, as by a tilt
-/// towards one direction, which is found with the rest: a base does not know in which direction the
-/// spindle lies, nor a block how the triad stands in it. Precondition: `term` acts on kTilt or
-/// kSeat.
+/// `term`, shared between h and the base roll as by a tilt towards one direction, which is found
+/// with the rest: a base does not know in which direction the spindle lies. Precondition: `term`
+/// acts on kTilt.
 std::unique_ptr<SmoothTerm> towards_a_direction(std::unique_ptr<SmoothTerm> term);
 
 }  // namespace plumbline

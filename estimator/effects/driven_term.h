@@ -60,6 +60,7 @@ class DrivenTerm : public SmoothTerm {
     const auto* other = dynamic_cast<const SmoothTerm*>(&repeated);
     const bool along_an_axis = target_.words() == kH.words() || target_.words() == kRoll.words();
     if (!along_an_axis || other == nullptr || p.size() != 1 ||
+        p.front().size() != parameters().size() + 1 ||
         !other->is(driver(), to_string(form()), function() + kTilt.words()))
       return {};
     return {{{p.front().begin(), p.front().end() - 1}}};

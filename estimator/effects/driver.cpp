@@ -289,6 +289,14 @@ Driver sign_of_load(const VisitLog& log) {
   return driver;
 }
 
+Driver size_of_load(const VisitLog& log) {
+  Driver driver = load(log);
+  driver.past = "size of a_i";
+  for (std::vector<double>& of_axis : driver.value)
+    for (double& value : of_axis) value = std::abs(value);
+  return driver;
+}
+
 std::vector<Driver> lengths_of_ways(const VisitLog& log) {
   const auto of_delta = [&](std::size_t k) { return std::abs(turn_rad(log, k)); };
   const auto of_h = [&](std::size_t k) {

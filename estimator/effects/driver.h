@@ -74,8 +74,9 @@ Driver load(const VisitLog& log);
 /// The same of the next axis and of the one after that.
 std::vector<Driver> loads_of_others(const VisitLog& log);
 
-/// Its sign; where it is nothing, what it was before.
+/// Its sign (where it is nothing, what it was before), and its size.
 Driver sign_of_load(const VisitLog& log);
+Driver size_of_load(const VisitLog& log);
 
 /// How far δ and h turned on the way to each visit.
 std::vector<Driver> lengths_of_ways(const VisitLog& log);

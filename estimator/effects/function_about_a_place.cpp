@@ -153,6 +153,30 @@ class Resonance final : public AboutAPlace {
   }
 };
 
+/// A load that goes by tilts the ground under it to one side, then to the other.
+class Passage final : public AboutAPlace {
+ public:
+  using AboutAPlace::AboutAPlace;
+
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kPlaces = 24;
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int k = 0; k <= kPlaces; ++k)
+      for (const double share : {0.02, 0.06})
+        starts.push_back(
+            {{low + (high - low) * k / kPlaces, share * (high - low), target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "passage"; }
+  double at(double value, const double* p) const override {
+    const double x = (value - p[0]) / p[1];
+    return p[2] * 2 * x / (1 + x * x);
+  }
+};
+
 class Seam final : public AboutAPlace {
  public:
   using AboutAPlace::AboutAPlace;
@@ -299,6 +323,9 @@ std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target) {
 }
 std::unique_ptr<SmoothTerm> resonance(DriverPointer driver, const Target& target) {
   return std::make_unique<Resonance>(std::move(driver), target);
+}
+std::unique_ptr<SmoothTerm> passage(DriverPointer driver, const Target& target) {
+  return std::make_unique<Passage>(std::move(driver), target);
 }
 std::unique_ptr<SmoothTerm> seam(DriverPointer driver, const Target& target) {
   return std::make_unique<Seam>(std::move(driver), target);

@@ -331,6 +331,7 @@ class Power final : public DrivenTerm {
     std::vector<Hypothesis> starts;
     for (const double beginning : beginnings())
       for (const double power : {0.5, 2.0}) {
+        if (!(high > beginning)) continue;
         if (target().mean_in_the_twelve())
           starts.push_back({{beginning, high, power, size}});
         else
@@ -383,7 +384,7 @@ std::string Target::words() const {
                               : pull == Pull::sine_of_h ? ", times the sine of h"
                                                         : "";
     const bool in_seat = angle == &HeadGeometry::seat_y_rad;
-    const char* const to = in_seat         ? ", added to the tilt of the triad in its seat"
+    const char* const to = in_seat         ? ", added to the turn of the triad in its seat"
                            : any_direction ? ", added to the tilt of the base"
                            : angle == &HeadGeometry::h_rad    ? ", added to h"
                            : angle == &HeadGeometry::roll_rad ? ", added to the base roll"

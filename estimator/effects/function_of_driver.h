@@ -35,16 +35,15 @@ struct Target {
   double factor_at(const Visit& visit) const;
 };
 
-/// The angles of head and base; the tilts of the base and of the triad in its seat are for
-/// towards_a_direction().
+/// The angles of head and base; the tilt of the base is for towards_a_direction(), what turns the
+/// triad in its seat for about_some_axis().
 inline constexpr Target kDelta{.form = TermForm::geometry};
 inline constexpr Target kH{.form = TermForm::geometry, .angle = &HeadGeometry::h_rad};
 inline constexpr Target kRoll{.form = TermForm::geometry, .angle = &HeadGeometry::roll_rad};
 inline constexpr Target kSkew{.form = TermForm::geometry, .angle = &HeadGeometry::skew_rad};
 inline constexpr Target kTilt{
     .form = TermForm::geometry, .angle = &HeadGeometry::h_rad, .any_direction = true};
-inline constexpr Target kSeat{
-    .form = TermForm::geometry, .angle = &HeadGeometry::seat_y_rad, .any_direction = true};
+inline constexpr Target kSeat{.form = TermForm::geometry, .angle = &HeadGeometry::seat_y_rad};
 
 /// Σ c_d·P_d, d = 1 … degree, of the range from low to high. Beyond it degree 1 goes straight on,
 /// degree 2 as a parabola as far as `curved`, in half-ranges, and then straight on; higher degrees
@@ -84,6 +83,8 @@ std::unique_ptr<SmoothTerm> one_position(DriverPointer angle, const Target& targ
 std::unique_ptr<SmoothTerm> bell(DriverPointer driver, const Target& target);
 /// What passes through a resonance: as 1/(1 + x²) about an unknown value.
 std::unique_ptr<SmoothTerm> resonance(DriverPointer driver, const Target& target);
+/// What passes by: to one side and to the other as x/(1 + x²) about an unknown value.
+std::unique_ptr<SmoothTerm> passage(DriverPointer driver, const Target& target);
 /// To one side and to the other of an unknown value, over an unknown width (the slope of a bell): a
 /// seam between two segments of a characteristic.
 std::unique_ptr<SmoothTerm> seam(DriverPointer driver, const Target& target);

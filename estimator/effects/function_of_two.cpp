@@ -93,7 +93,7 @@ class LineTimesLine final : public DrivenTerm {
     const auto [low, high] = range();
     const auto [other_low, other_high] =
         std::minmax_element(other_->value[axis].begin(), other_->value[axis].end());
-    if (!(*other_high > *other_low)) return {};
+    if (!(high > low) || !(*other_high > *other_low)) return {};
     const double size = target().typical_size();
     return {{{low, high, *other_low, *other_high, size, size, size}}};
   }

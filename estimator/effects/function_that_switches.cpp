@@ -19,10 +19,12 @@ class Pulses final : public DrivenTerm {
   std::vector<ParameterInfo> parameters() const override {
     constexpr double kFine = 0.1;  // of an edge, so that some readings are in it
     const double fine = kFine * edge();
-    return {effect::instant("edge"),
-            {"period", "s", ParameterRole::shape, fine},
-            {"width", "s", ParameterRole::shape, fine},
-            {"middle", "s", ParameterRole::shape, fine, true},
+    ParameterInfo edge_info = effect::instant("edge");
+    edge_info.unit = variable().unit();
+    return {std::move(edge_info),
+            {"period", variable().unit(), ParameterRole::shape, fine},
+            {"width", variable().unit(), ParameterRole::shape, fine},
+            {"middle", variable().unit(), ParameterRole::shape, fine, true},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {

@@ -7,93 +7,115 @@
 namespace plumbline {
 namespace {
 
-class HeadDecay final : public HeadInDwell {
+/// Proportional to what every arrival sets off.
+class SetOff : public HeadInDwell {
  public:
-  HeadDecay(double HeadGeometry::*angle, DecayOf of) : HeadInDwell(angle), of_(of) {}
+  SetOff(double HeadGeometry::*angle, SetOffBy by) : HeadInDwell(angle), by_(by) {}
 
   std::string shape() const override {
-    switch (of_) {
-      case DecayOf::one:
-        break;
-      case DecayOf::weight:
-        return HeadInDwell::shape() + ", times the cosine of h";
-      case DecayOf::way:
-        return HeadInDwell::shape() + ", times the way turned";
-    }
-    return HeadInDwell::shape();
+    const char* const times = by_ == SetOffBy::weight      ? ", times the cosine of h"
+                              : by_ == SetOffBy::way       ? ", times the way turned"
+                              : by_ == SetOffBy::direction ? ", times the direction of the way"
+                                                           : "";
+    return HeadInDwell::shape() + times;
   }
-  bool remembers() const override { return of_ == DecayOf::way; }
+  bool remembers() const override { return by_ == SetOffBy::way || by_ == SetOffBy::direction; }
   bool guesses_at_start() const override { return remembers(); }
+
+ protected:
+  ParameterInfo amplitude(const char* name) const {
+    return {name, by_ == SetOffBy::way ? "" : "deg", ParameterRole::amplitude};
+  }
+  double typical_size() const {
+    return by_ == SetOffBy::way ? effect::kSmallTerm : effect::kSmallAngle_deg;
+  }
+  /// For an amplitude of 1.
+  double size_rad(const VisitLog& log, std::size_t visit) const {
+    const Visit& at = log.visits[visit];
+    switch (by_) {
+      case SetOffBy::arrival:
+        break;
+      case SetOffBy::weight:
+        return std::cos(at.h_rad) * kRadPerDeg;
+      case SetOffBy::way:
+        return log.before(visit) ? back_rad(log, visit) : 0;
+      case SetOffBy::direction:
+        return is_delta() ? -at.delta_direction[0] * kRadPerDeg : last_of_h_rad(log, visit);
+    }
+    return kRadPerDeg;
+  }
+
+ private:
+  double back_rad(const VisitLog& log, std::size_t visit) const {
+    const Visit &at = log.visits[visit], &before = *log.before(visit);
+    return is_delta() ? shorter_turn_rad(at, before) : before.h_rad - at.h_rad;
+  }
+  /// Back from where h went last, if only the spindle has moved since.
+  double last_of_h_rad(const VisitLog& log, std::size_t visit) const {
+    constexpr double kMoved_rad = 1e-9;
+    for (; log.before(visit) != nullptr; --visit)
+      if (const double back = back_rad(log, visit); std::abs(back) > kMoved_rad)
+        return std::copysign(kRadPerDeg, back);
+    return 0;
+  }
+
+  SetOffBy by_;
+};
+
+class HeadDecay final : public SetOff {
+ public:
+  using SetOff::SetOff;
+
   std::vector<ParameterInfo> parameters() const override {
     // true_at 0: the angle is right in the end; 1: it was right on arrival.
-    return {{"c", of_ == DecayOf::way ? "" : "deg", ParameterRole::amplitude},
-            {"tau", "s", ParameterRole::shape},
-            {"true_at", "", ParameterRole::index}};
+    return {
+        amplitude("c"), {"tau", "s", ParameterRole::shape}, {"true_at", "", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     const Visit& visit = log.visits.front();
     const double dwell_s = visit.duration_s();
     if (!(dwell_s > 0)) return {};
-    const double size = of_ == DecayOf::way ? effect::kSmallTerm : effect::kSmallAngle_deg;
     std::vector<Hypothesis> starts;
     for (const double tau_s : effect::geometric(dwell_s / 10, dwell_s * 3, 6))
-      for (const double true_at : {0.0, 1.0}) starts.push_back({{size, tau_s, true_at}});
+      for (const double true_at : {0.0, 1.0}) starts.push_back({{typical_size(), tau_s, true_at}});
     return starts;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     const Visit& at = log.visits[visit];
     const double decay = effect::mean_decay(at, at.t_arrival_s, p[1]);
-    head.*angle() += size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0));
+    head.*angle() += p[0] * size_rad(log, visit) * (decay - (p[2] > 0.5 ? 1 : 0));
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
     const Eigen::ArrayXd decay = effect::decay_since_arrival(log.visits[visit], p[1]);
-    return {angle(), size_rad(log, visit, p) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
+    return {angle(), p[0] * size_rad(log, visit) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
   }
 
  private:
   std::string function() const override { return "exponential after arrival"; }
-  /// From arrival to the end.
-  double size_rad(const VisitLog& log, std::size_t visit, const double* p) const {
-    const Visit& at = log.visits[visit];
-    switch (of_) {
-      case DecayOf::one:
-        break;
-      case DecayOf::weight:
-        return p[0] * std::cos(at.h_rad) * kRadPerDeg;
-      case DecayOf::way: {
-        const Visit* before = log.before(visit);
-        if (before == nullptr) return 0;
-        return p[0] * (is_delta() ? shorter_turn_rad(at, *before) : before->h_rad - at.h_rad);
-      }
-    }
-    return p[0] * kRadPerDeg;
-  }
-
-  DecayOf of_;
 };
 
-class HeadRinging final : public HeadInDwell {
+class HeadRinging final : public SetOff {
  public:
-  using HeadInDwell::HeadInDwell;
+  using SetOff::SetOff;
 
   std::vector<ParameterInfo> parameters() const override {
     return {{"f", "Hz", ParameterRole::shape},
             {"tau", "s", ParameterRole::shape},
-            {"c", "deg", ParameterRole::amplitude},
-            {"s", "deg", ParameterRole::amplitude}};
+            amplitude("c"),
+            amplitude("s")};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
     std::vector<Hypothesis> starts = effect::starts_of_ringing(log.visits.front());
-    for (Hypothesis& start : starts) start.p[2] = start.p[3] = effect::kSmallAngle_deg;
+    for (Hypothesis& start : starts) start.p[2] = start.p[3] = typical_size();
     return starts;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*angle() += effect::mean_of_ringing(log.visits[visit], p) * kRadPerDeg;
+    head.*angle() += effect::mean_of_ringing(log.visits[visit], p) * size_rad(log, visit);
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    return {angle(), effect::ringing(log.visits[visit], p) * kRadPerDeg};
+    return {angle(), effect::ringing(log.visits[visit], p) * size_rad(log, visit)};
   }
 
  private:
@@ -102,12 +124,12 @@ class HeadRinging final : public HeadInDwell {
 
 }  // namespace
 
-std::unique_ptr<SmoothTerm> head_ringing(double HeadGeometry::*angle) {
-  return std::make_unique<HeadRinging>(angle);
+std::unique_ptr<SmoothTerm> head_ringing(double HeadGeometry::*angle, SetOffBy by) {
+  return std::make_unique<HeadRinging>(angle, by);
 }
 
-std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, DecayOf of) {
-  return std::make_unique<HeadDecay>(angle, of);
+std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, SetOffBy by) {
+  return std::make_unique<HeadDecay>(angle, by);
 }
 
 }  // namespace plumbline

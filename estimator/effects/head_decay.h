@@ -7,15 +7,16 @@
 
 namespace plumbline {
 
-/// What the angle that decays is proportional to.
-enum class DecayOf { one, weight, way };
+/// What the angle that dies away is proportional to: the same after every move; the cosine of h (a
+/// weight that sinks); the way that this angle has just turned, or the direction in which it turned
+/// last.
+enum class SetOffBy { arrival, weight, way, direction };
 
 /// c·exp(−(time since arrival)/τ) added to δ or h, less c where the angle was right on arrival and
-/// wanders off: the same after every move, or times the cosine of h (a weight that sinks), or times
-/// the way that this angle has just turned.
-std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, DecayOf of);
+/// wanders off.
+std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, SetOffBy by);
 
 /// A sine that every arrival sets off in δ or h and that dies away (effect::ringing()).
-std::unique_ptr<SmoothTerm> head_ringing(double HeadGeometry::*angle);
+std::unique_ptr<SmoothTerm> head_ringing(double HeadGeometry::*angle, SetOffBy by);
 
 }  // namespace plumbline

@@ -9,6 +9,7 @@
 
 #include "estimator/effects/base_tilt.h"
 #include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/turn_about_axes.h"
 
 namespace plumbline {
 namespace {
@@ -280,6 +281,7 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
     };
     for (const Target& target : {kDelta, kH, kRoll}) terms.push_back(of(target));
     terms.push_back(towards_a_direction(of(kTilt)));
+    terms.push_back(about_some_axis(of(kSeat)));
   }
   const auto add = [&](const DriverPointer& driver, MemoryOf of, const Target& target) {
     terms.push_back(std::make_unique<MemoryTerm>(std::make_shared<const Memory>(driver, of, log),

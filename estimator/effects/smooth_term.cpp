@@ -13,6 +13,7 @@
 #include "estimator/effects/head_decay.h"
 #include "estimator/effects/memory_term.h"
 #include "estimator/effects/steady_line.h"
+#include "estimator/effects/turn_about_axes.h"
 
 namespace plumbline {
 
@@ -104,6 +105,7 @@ class TermList {
       add(play(attitude, kBias, OfPlay::lag));
       add(friction(attitude, kBias));
       add(relay(attitude, kBias));
+      add(relay(shared(size_of_load(log_)), kBias));
       add(friction(attitude, {.form = TermForm::scale, .second = 0}));
     }
     for (auto& term : memory_terms(log_, longest_s(), attitude, columns_)) add(std::move(term));
@@ -119,6 +121,8 @@ class TermList {
   void add(std::unique_ptr<SmoothTerm> term) { terms_.push_back(std::move(term)); }
   /// Of the base, towards a direction of its own.
   void add_tilt(std::unique_ptr<SmoothTerm> of_h) { add(towards_a_direction(std::move(of_h))); }
+  /// Of the triad, about an axis of its own.
+  void add_seat(std::unique_ptr<SmoothTerm> of_y) { add(about_some_axis(std::move(of_y))); }
   /// A variable that never varied drives nothing.
   template <class Use>
   void for_each(std::vector<Driver> drivers, const Use& use) {
@@ -169,7 +173,7 @@ class TermList {
           add_polynomials(driver, {.form = TermForm::scale, .other = other, .second = second}, {1});
       add_polynomials(driver, kRoll, {1, 2, 3});
       for (const int degree : {1, 2, 3}) add_tilt(polynomial(driver, kTilt, degree));
-      for (const int degree : {1, 2}) add_tilt(polynomial(driver, kSeat, degree));
+      for (const int degree : {1, 2}) add_seat(polynomial(driver, kSeat, degree));
       add_polynomials(driver, kSkew, {1, 2});
     }
     if (clock || column)
@@ -178,6 +182,7 @@ class TermList {
     if (driver->past == "change of a_i since") add(bend(driver, kBias));
     if (driver->is_rate()) {
       add_steps(driver, kBias);
+      add(bend(driver, kBias));
       rates_.push_back(driver);
     }
     if (clock) add_of_clock(driver);
@@ -208,7 +213,8 @@ class TermList {
     for (std::size_t other = 1; other < kAxisCount; ++other)
       add(window(clock, {.form = TermForm::scale, .other = other}));
     add_tilt(window(clock, kTilt));
-    add_tilt(step(clock, kSeat, StepEdge::sharp));
+    add_seat(step(clock, kSeat, StepEdge::sharp));
+    add_seat(decay(clock, kSeat));
     add(dying_wave(clock, kBias));
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));
@@ -228,7 +234,11 @@ class TermList {
       add_tilt(step(clock, kTilt, edge));
     add_tilt(decay(clock, kTilt));
     add_tilt(logarithm(clock, kTilt));
-    add_tilt(wave(clock, kTilt, {1.5, 0.5, 20}));
+    add(in_both_directions(wave(clock, kTilt, {0.5, 0.5, 20})));
+    for (const auto& shape : {bell, passage}) {
+      for (const Target& target : {kH, kRoll}) add(shape(clock, target));
+      add_tilt(shape(clock, kTilt));
+    }
     for (std::size_t other = 1; other < kAxisCount; ++other)
       add(step(clock, {.form = TermForm::scale, .other = other}, StepEdge::sharp));
   }
@@ -247,7 +257,9 @@ class TermList {
     add(bend(driver, kDelta));
     add(relay(driver, kDelta));
     add_steps(driver, kBias);
-    add_tilt(step(driver, kSeat, StepEdge::sharp));  // a block that rocks
+    // A block that rocks, or stands on something soft at one side.
+    add_seat(step(driver, kSeat, StepEdge::sharp));
+    add_seat(bend(driver, kSeat));
     for (const auto& shape : {bell, seam}) add(shape(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 20}));
     add(saw_tooth(driver, kBias));
@@ -287,6 +299,7 @@ class TermList {
     constexpr int kFirstUnlisted = 18;
     add(harmonic(delta, kDelta, kFirstUnlisted));
     add(harmonics_of_part(delta, kDelta));
+    add(saw_tooth(delta, kDelta));
     for (const Target& angle : {kDelta, kH})
       for (const Target& target : pulled(angle)) add(harmonic(delta, target, 1));
   }
@@ -356,13 +369,15 @@ class TermList {
       add(event_of_dwells(shape));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
       add(swinging_angle(angle));
-      add(head_ringing(angle));
     }
     for (const auto* drivers : {&columns_, &rates_})
       for (const DriverPointer& driver : *drivers) add(line_of_column(driver));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
-      for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way})
-        add(head_decay(angle, of));
+      for (const SetOffBy by :
+           {SetOffBy::arrival, SetOffBy::weight, SetOffBy::way, SetOffBy::direction}) {
+        add(head_decay(angle, by));
+        if (by == SetOffBy::arrival || by == SetOffBy::way) add(head_ringing(angle, by));
+      }
   }
   void add_of_code(const DriverPointer& code) {
     // What repeats from step to step, or every second step, is the rounding itself, or a bit.
@@ -375,6 +390,7 @@ class TermList {
     add(missing_band(code, kBias));
     add(bit_of_code(code, kBias, log_.adc));
     add(saw_tooth(code, kBias));
+    add(pulses(code, kBias));
   }
 
   const VisitLog& log_;

@@ -170,8 +170,9 @@ TEST_F(EveryEffect, JacobianBesideOthersIsThatOfWholePredictions) {
 TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
   const VisitLog log = example_log();
   for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
-    for (const DecayOf of : {DecayOf::one, DecayOf::weight, DecayOf::way}) {
-      const auto effect = head_decay(angle, of);
+    for (const SetOffBy by :
+         {SetOffBy::arrival, SetOffBy::weight, SetOffBy::way, SetOffBy::direction}) {
+      const auto effect = head_decay(angle, by);
       const std::vector<Hypothesis> starts = effect->hypotheses(log, 0);
       ASSERT_EQ(starts.size(), 12u);
       const int visit = 17;
@@ -180,11 +181,13 @@ TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
                                                                : before.h_rad - at.h_rad;
       for (const Hypothesis& start : starts) {
         const ActiveEffect active = activate(*effect, 0, start);
-        const double rad_of[] = {kRadPerDeg, kRadPerDeg * std::cos(at.h_rad), way_rad};
+        const double side = way_rad == 0 ? 0 : std::copysign(1, way_rad);
+        const double rad_of[] = {kRadPerDeg, kRadPerDeg * std::cos(at.h_rad), way_rad,
+                                 kRadPerDeg * side};
         Eigen::VectorXd reading_V(8);
         for (Eigen::Index m = 0; m < 8; ++m) {
           HeadGeometry head{at.delta_rad, at.h_rad};
-          head.*angle += start.p[0] * rad_of[static_cast<int>(of)] *
+          head.*angle += start.p[0] * rad_of[static_cast<int>(by)] *
                          (std::exp(-0.01 * static_cast<double>(m) / start.p[1]) - start.p[2]);
           reading_V(m) = twelve().twelve[1].head<3>().dot(specific_force_g(head, log.gamma));
         }
