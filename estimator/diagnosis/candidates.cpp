@@ -113,19 +113,45 @@ CandidateList all_candidates(const VisitLog& log,
 
 namespace {
 
+constexpr std::array kAngles = {&HeadGeometry::delta_rad,  &HeadGeometry::h_rad,
+                                &HeadGeometry::roll_rad,   &HeadGeometry::skew_rad,
+                                &HeadGeometry::seat_x_rad, &HeadGeometry::seat_y_rad};
+using PerAngle = Eigen::Matrix<double, kAxisCount, kAngles.size()>;
+
+/// What each angle does to the outputs of the three axes, V/rad.
+PerAngle slopes_V(const EnlargedParameters& model, const HeadGeometry& head, double gamma) {
+  constexpr double kStep_rad = 1e-4;
+  PerAngle slopes;
+  for (std::size_t angle = 0; angle < kAngles.size(); ++angle) {
+    HeadGeometry before = head, after = head;
+    before.*kAngles[angle] -= kStep_rad;
+    after.*kAngles[angle] += kStep_rad;
+    const Eigen::Vector3d per_rad =
+        (specific_force_g(after, gamma) - specific_force_g(before, gamma)) / (2 * kStep_rad);
+    for (std::size_t i = 0; i < kAxisCount; ++i)
+      slopes(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(angle)) =
+          model.twelve[i].head<3>().dot(per_rad);
+  }
+  return slopes;
+}
+
 /// The model as it stands, evaluated once for all candidates.
 struct Baseline {
   const VisitLog& log;
   const EnlargedParameters& model;
   std::vector<HeadGeometry> head;    ///< with the model's own effects
   std::vector<Eigen::Vector3d> a_g;  ///< seen through that geometry
+  std::vector<PerAngle> slope_V;     ///< of the outputs, at every visit
   PerAxis<std::vector<TermInput>> inputs;
 
   Baseline(const VisitLog& of_log, const EnlargedParameters& of_model)
       : log(of_log),
         model(of_model),
         head(head_geometries(of_log, of_model)),
-        a_g(specific_forces_g(of_log, of_model)) {
+        a_g(specific_forces_g(of_log, of_model)),
+        slope_V(head.size()) {
+    parallel_for(head.size(),
+                 [this](std::size_t k) { slope_V[k] = slopes_V(model, head[k], log.gamma); });
     parallel_for(kAxisCount, [this](std::size_t axis) {
       for (std::size_t k = 0; k < a_g.size(); ++k)
         inputs[axis].push_back(term_input(log, model, axis, a_g, k));
@@ -153,8 +179,9 @@ void set_sensor_response(const Baseline& base, const SingleAmplitude& single,
   }
 }
 
-// What a head effect changes on all axes, V, 3n rows. What it changes in the terms of sensor
-// effects that are in the model already is left to the refit.
+// What a head effect changes on all axes, V, 3n rows, to first order. What it changes in the terms
+// of sensor effects that are in the model already is left to the refit, as all else that a large
+// angle does.
 void add_head_response(const Baseline& base, const SingleAmplitude& single,
                        Eigen::Ref<Eigen::VectorXd> change) {
   const Effect& effect = *single.active.effect;
@@ -168,9 +195,12 @@ void add_head_response(const Baseline& base, const SingleAmplitude& single,
       effect.displace_by_number(base.log, visit, single.number[visit], single.active.p.data(),
                                 head);
     if (head == base.head[visit]) continue;  // most candidates concern few visits
-    const Eigen::Vector3d moved = specific_force_g(head, base.log.gamma) - base.a_g[visit];
-    for (std::size_t i = 0; i < kAxisCount; ++i)
-      change(static_cast<Eigen::Index>(i) * n + k) = base.model.twelve[i].head<3>().dot(moved);
+    Eigen::Vector<double, kAngles.size()> turned_rad;
+    for (std::size_t angle = 0; angle < kAngles.size(); ++angle)
+      turned_rad(static_cast<Eigen::Index>(angle)) =
+          head.*kAngles[angle] - base.head[visit].*kAngles[angle];
+    const Eigen::Vector3d moved_V = base.slope_V[visit] * turned_rad;
+    for (Eigen::Index i = 0; i < moved_V.size(); ++i) change(i * n + k) = moved_V(i);
   }
 }
 

@@ -239,7 +239,8 @@ class Step final : public DrivenTerm {
     int parts = 12;
     // A large one is wrong by much at every visit between it and the place tried.
     if (sharp) {
-      const int visits = target().other == 0 ? 2 : 4;
+      const bool has_rivals = target().other != 0 || target().angle == kSeat.angle;
+      const int visits = has_rivals ? 4 : 2;
       const bool clock = variable().is_clock();
       widths = {clock ? part_of_spacing() : 0.01 * (high - low)};
       parts = clock ? static_cast<int>(variable().value[0].size()) / visits : 32;

@@ -18,13 +18,10 @@ struct Axis {
 /// The parameters are those of the term, with one for each axis in the place of each amplitude.
 class TurnAboutAxes final : public SmoothTerm {
  public:
-  /// `moves`: the angle that the term displaces; `may_do_without_last`: of the axes.
+  /// `moves`: the angle that the term displaces.
   TurnAboutAxes(std::unique_ptr<SmoothTerm> term, double HeadGeometry::*moves,
-                std::vector<Axis> axes, bool may_do_without_last)
-      : term_(std::move(term)),
-        moves_(moves),
-        axes_(std::move(axes)),
-        may_do_without_last_(may_do_without_last) {
+                std::vector<Axis> axes)
+      : term_(std::move(term)), moves_(moves), axes_(std::move(axes)) {
     for (const ParameterInfo& info : term_->parameters())
       is_amplitude_.push_back(info.role == ParameterRole::amplitude);
   }
@@ -86,7 +83,7 @@ class TurnAboutAxes final : public SmoothTerm {
                                  const std::vector<std::vector<double>>& p) const override {
     constexpr double kOfTheOther = 0.2;
     const auto* other = dynamic_cast<const SmoothTerm*>(&repeated);
-    if (other == nullptr || other == this || may_do_without_last_ || p.size() != 1 ||
+    if (other == nullptr || other == this || moves_ != kTilt.angle || p.size() != 1 ||
         other->driver() != driver() || p.front().size() != is_amplitude_.size())
       return {};
     const std::string function = shape().substr(0, shape().rfind(kTilt.words()));
@@ -125,40 +122,34 @@ class TurnAboutAxes final : public SmoothTerm {
   }
   std::vector<Hypothesis> about_axes(const std::vector<Hypothesis>& of_term) const {
     std::vector<Hypothesis> all;
-    for (const Hypothesis& hypothesis : of_term)
-      for (const bool without_last : {true, false}) {
-        if (without_last && !may_do_without_last_) continue;
-        std::vector<double> p;
-        for (std::size_t k = 0; k < is_amplitude_.size(); ++k) {
-          p.insert(p.end(), width(k), hypothesis.p[k]);
-          if (is_amplitude_[k] && without_last) p.back() = 0;
-        }
-        all.push_back({std::move(p)});
-      }
+    for (const Hypothesis& hypothesis : of_term) {
+      std::vector<double> p;
+      for (std::size_t k = 0; k < is_amplitude_.size(); ++k)
+        p.insert(p.end(), width(k), hypothesis.p[k]);
+      all.push_back({std::move(p)});
+    }
     return all;
   }
 
   std::unique_ptr<SmoothTerm> term_;
   double HeadGeometry::*moves_;
   std::vector<Axis> axes_;
-  bool may_do_without_last_;
   std::vector<bool> is_amplitude_;  ///< each of the term's parameters
 };
 
 }  // namespace
 
 std::unique_ptr<SmoothTerm> about_some_axis(std::unique_ptr<SmoothTerm> term) {
-  return std::make_unique<TurnAboutAxes>(std::move(term), &HeadGeometry::seat_y_rad,
+  return std::make_unique<TurnAboutAxes>(std::move(term), kSeat.angle,
                                          std::vector<Axis>{{&HeadGeometry::seat_x_rad, "_x"},
                                                            {&HeadGeometry::seat_y_rad, "_y"},
-                                                           {&HeadGeometry::delta_rad, "_z"}},
-                                         true);
+                                                           {&HeadGeometry::delta_rad, "_z"}});
 }
 
 std::unique_ptr<SmoothTerm> in_both_directions(std::unique_ptr<SmoothTerm> term) {
   return std::make_unique<TurnAboutAxes>(
-      std::move(term), &HeadGeometry::h_rad,
-      std::vector<Axis>{{&HeadGeometry::h_rad, "_h"}, {&HeadGeometry::roll_rad, "_roll"}}, false);
+      std::move(term), kTilt.angle,
+      std::vector<Axis>{{&HeadGeometry::h_rad, "_h"}, {&HeadGeometry::roll_rad, "_roll"}});
 }
 
 }  // namespace plumbline
