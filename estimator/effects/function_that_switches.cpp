@@ -27,10 +27,11 @@ class Pulses final : public DrivenTerm {
             {"middle", variable().unit(), ParameterRole::shape, fine, true},
             {"p", target().unit(), ParameterRole::amplitude}};
   }
-  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     const auto [low, high] = range();
     constexpr int kMiddles = 4, kMostPulses = 8;
     std::vector<Hypothesis> starts;
+    if (is_of_another_axis(axis)) return starts;
     for (int pulses = 2; pulses <= kMostPulses; ++pulses) {
       const double period = (high - low) / pulses;
       for (int k = 0; k < kMiddles; ++k)

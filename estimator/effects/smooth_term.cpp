@@ -263,6 +263,7 @@ class TermList {
     for (const auto& shape : {bell, seam}) add(shape(driver, kBias));
     add(wave(driver, kBias, {1.5, 0.5, 20}));
     add(saw_tooth(driver, kBias));
+    add(pulses(driver, kBias));
     // What is no shape of its own.
     add_polynomials(driver, kBias, {4, 6, 8, 12});
   }

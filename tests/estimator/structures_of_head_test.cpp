@@ -242,5 +242,66 @@ TEST(Structure, AFrameThatTwistsWithTheTiltIsNoAliasOfItself) {
   EXPECT_NEAR(parameter(found, "period").value, 120 * kRadians, 5 * kRadians);
 }
 
+// About no axis of the triad: as a turn of delta and a tilt.
+TEST(Structure, GlueThatCreepsTurnsTheTriadAboutAnAxisOfItsOwn) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  const auto turn_rad = [](double t_s) { return 0.012 * std::exp(-(t_s - 61) / 90); };
+  // Almost the sensitivities of the run, turned about (0.6, 0.6, 0.53).
+  options.more_V[0] = [=](const auto& a_g, double t_s) {
+    return 0.032 * turn_rad(t_s) * (0.53 * a_g[1] - 0.6 * a_g[2]);
+  };
+  options.more_V[1] = [=](const auto& a_g, double t_s) {
+    return 0.0314 * turn_rad(t_s) * (0.6 * a_g[2] - 0.53 * a_g[0]);
+  };
+  options.more_V[2] = [=](const auto& a_g, double t_s) {
+    return -0.0328 * turn_rad(t_s) * (0.6 * a_g[0] - 0.6 * a_g[1]);
+  };
+  expect_only_structure(
+      options, {"t_s", "geometry", "exponential, added to the turn of the triad in its seat"});
+}
+
+// As a wave in one direction and a parabola.
+TEST(Structure, AFloorThatTheSunTiltsGoesAlongAnEllipse) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.base_roll_rad = [](double t_s) { return 0.01 * std::sin(t_s / 75); };
+  options.base_tilt_rad = [](double t_s) { return 0.006 * std::cos(t_s / 75); };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"t_s", "geometry", "wave, added to the tilt of the base"});
+  EXPECT_NEAR(parameter(found, "period").value, 75 * 2 * std::numbers::pi, 10);
+}
+
+// As steps and polynomials.
+TEST(Structure, ALoadThatGoesByTiltsTheFloorToAndFro) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.base_tilt_rad = [](double t_s) {
+    const double u = (t_s - 310) / 20;
+    return 0.012 * u / (1 + u * u);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"t_s", "geometry", "passage, added to h"});
+  EXPECT_NEAR(parameter(found, "middle").value, 310, 5);
+}
+
+// As a hysteresis, and polynomials of the change of h.
+TEST(Structure, AnArmThatCreepsBackGoesByTheDirectionOfItsMove) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.samples_per_pose = 40;
+  options.h_error_deg = [at_deg = 0.0, way = 0.0, sample = 0, last_delta_deg = 0.0](
+                            double delta_deg, double h_deg) mutable {
+    if (h_deg != at_deg) way = h_deg > at_deg ? -1 : 1;
+    if (h_deg != at_deg || delta_deg != last_delta_deg) sample = 0;
+    at_deg = h_deg;
+    last_delta_deg = delta_deg;
+    return 0.15 * way * std::exp(-0.01 * sample++ / 0.1);
+  };
+  expect_only_structure(options,
+                        {"t_in_pose", "geometry",
+                         "exponential after arrival, added to h, times the direction of the way"});
+}
+
 }  // namespace
 }  // namespace plumbline

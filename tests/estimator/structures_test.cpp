@@ -510,5 +510,19 @@ TEST(Structure, AFieldThatFollowsAColumnTurnsUnderTheTriad) {
                         {"mag_uT", "bias", "straight line, times a field of the base"});
 }
 
+// As a saw tooth and waves.
+TEST(Structure, ACarryThatLiftsPartOfThePatternIsATrainOfPulses) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.h_step_deg = 10;
+  options.more_V[0] = [](const auto& a_g, double) {
+    const double share = 0.45 + a_g[0] / 0.31;
+    return share - std::floor(share) < 0.3 ? 3e-4 : 0;
+  };
+  const UnlistedStructure found =
+      expect_only_structure(options, {"a_x", "bias", "train of pulses"});
+  EXPECT_NEAR(parameter(found, "period").value, 0.31, 0.01);
+}
+
 }  // namespace
 }  // namespace plumbline

@@ -215,5 +215,16 @@ TEST(Structure, AFilmThatBuildsUpWithTheTurnGoesByAPowerOfItsSize) {
   EXPECT_NEAR(parameter(found, "power").value, 0.5, 0.15);
 }
 
+// As bells of other axes, and relays of the component itself.
+TEST(Structure, ARangeThatSwitchesLateIsARelayOfTheSize) {
+  SyntheticOptions options = fine_turns_at_random();
+  options.more_V[0] = [coarse = false](const auto& a_g, double) mutable {
+    if (std::abs(a_g[0]) > 0.79) coarse = true;
+    if (std::abs(a_g[0]) < 0.37) coarse = false;
+    return coarse ? 3e-4 : 0;
+  };
+  expect_only_structure(options, {"previous_pose", "bias", "relay in the size of a_i"});
+}
+
 }  // namespace
 }  // namespace plumbline
