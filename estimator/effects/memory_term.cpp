@@ -288,7 +288,6 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
                                                  target, longest_s));
   };
   for (const DriverPointer& column : columns) add(column, MemoryOf::square, kBias);
-  if (!attitude->varies()) return terms;
   // What it draws heats; where it rests, charges gather; what it warms on one side bends.
   for (const MemoryOf of : {MemoryOf::square, MemoryOf::sign}) add(attitude, of, kBias);
   for (Driver& other : loads_of_others(log)) add(shared(std::move(other)), MemoryOf::rest, kBias);
