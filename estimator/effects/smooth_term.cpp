@@ -372,7 +372,9 @@ class TermList {
       add(swinging_angle(angle));
     }
     for (const auto* drivers : {&columns_, &rates_})
-      for (const DriverPointer& driver : *drivers) add(line_of_column(driver));
+      for (const DriverPointer& driver : *drivers)
+        for (const StrengthBy by : {StrengthBy::value, StrengthBy::size})
+          add(line_of_column(driver, by));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
       for (const SetOffBy by :
            {SetOffBy::arrival, SetOffBy::weight, SetOffBy::way, SetOffBy::direction}) {

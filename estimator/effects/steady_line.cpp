@@ -1,6 +1,7 @@
 #include "estimator/effects/steady_line.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -38,12 +39,15 @@ class SwingingAngle final : public HeadInDwell {
 
 class LineOfColumn final : public SmoothTerm {
  public:
-  explicit LineOfColumn(DriverPointer column) : column_(std::move(column)) {}
+  LineOfColumn(DriverPointer column, StrengthBy by) : column_(std::move(column)), by_(by) {}
 
   std::string id() const override { return "unlisted:" + column_->name + ":sample"; }
   const std::string& driver() const override { return column_->name; }
   TermForm form() const override { return TermForm::sample; }
-  std::string shape() const override { return "straight line, times a sine"; }
+  std::string shape() const override {
+    return by_ == StrengthBy::size ? "straight line, times a sine in its size"
+                                   : "straight line, times a sine";
+  }
   Subject subject() const override { return Subject::sensor; }
   bool within_dwell() const override { return true; }
   std::vector<std::string> columns() const override { return column_->columns(); }
@@ -58,9 +62,15 @@ class LineOfColumn final : public SmoothTerm {
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     const auto& line = log.line[axis];
     const std::vector<double>& value = column_->value[axis];
-    const auto [low, high] = std::minmax_element(value.begin(), value.end());
-    if (!line || !line->steady || !(*high > *low)) return {};
-    return {{{*low, *high, line->f_hz, effect::start_of_phase_deg(*line), effect::kSmallTerm,
+    auto [low, high] = std::pair(*std::min_element(value.begin(), value.end()),
+                                 *std::max_element(value.begin(), value.end()));
+    if (!line || !line->steady || !(high > low)) return {};
+    if (by_ == StrengthBy::size) {
+      if (!(low < 0 && high > 0)) return {};  // of one sign it is a straight line
+      high = std::max(-low, high);
+      low = 0;
+    }
+    return {{{low, high, line->f_hz, effect::start_of_phase_deg(*line), effect::kSmallTerm,
               effect::kSmallTerm}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
@@ -72,11 +82,13 @@ class LineOfColumn final : public SmoothTerm {
 
  private:
   double size_g(const TermInput& input, const double* p) const {
-    const double value = column_->value[input.axis][input.visit];
+    const double of_column = column_->value[input.axis][input.visit];
+    const double value = by_ == StrengthBy::size ? std::abs(of_column) : of_column;
     return p[4] + p[5] * (2 * value - p[0] - p[1]) / (p[1] - p[0]);
   }
 
   DriverPointer column_;
+  StrengthBy by_;
 };
 
 }  // namespace
@@ -84,8 +96,8 @@ class LineOfColumn final : public SmoothTerm {
 std::unique_ptr<SmoothTerm> swinging_angle(double HeadGeometry::*angle) {
   return std::make_unique<SwingingAngle>(angle);
 }
-std::unique_ptr<SmoothTerm> line_of_column(DriverPointer column) {
-  return std::make_unique<LineOfColumn>(std::move(column));
+std::unique_ptr<SmoothTerm> line_of_column(DriverPointer column, StrengthBy by) {
+  return std::make_unique<LineOfColumn>(std::move(column), by);
 }
 
 }  // namespace plumbline
