@@ -179,9 +179,13 @@ TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
       const Visit &before = log.visits.at(visit - 1), &at = log.visits.at(visit);
       const double way_rad = angle == &HeadGeometry::delta_rad ? before.delta_rad - at.delta_rad
                                                                : before.h_rad - at.h_rad;
+      double side = way_rad;  // of the last move, where there was none to this visit
+      for (int k = visit; side == 0; --k)
+        side = log.visits.at(static_cast<std::size_t>(k - 1)).h_rad -
+               log.visits.at(static_cast<std::size_t>(k)).h_rad;
+      side = std::copysign(1, side);
       for (const Hypothesis& start : starts) {
         const ActiveEffect active = activate(*effect, 0, start);
-        const double side = way_rad == 0 ? 0 : std::copysign(1, way_rad);
         const double rad_of[] = {kRadPerDeg, kRadPerDeg * std::cos(at.h_rad), way_rad,
                                  kRadPerDeg * side};
         Eigen::VectorXd reading_V(8);
@@ -312,7 +316,7 @@ TEST(VisitLog, AnotherClockOrAnotherRecordHasNoHistory) {
 }
 
 const Effect& catalogued(const std::string& id) {
-  const auto all = effect_catalogue();
+  const auto& all = effect_catalogue();
   return **std::find_if(all.begin(), all.end(),
                         [&](const Effect* effect) { return effect->id() == id; });
 }
