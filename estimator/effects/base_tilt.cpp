@@ -7,28 +7,21 @@
 #include <vector>
 
 #include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/wrapped_term.h"
 
 namespace plumbline {
 namespace {
 
 /// The last parameter is the direction: 0 tilts as h does, 90° as the base roll does.
-class BaseTilt final : public SmoothTerm {
+class BaseTilt final : public WrappedTerm {
  public:
-  explicit BaseTilt(std::unique_ptr<SmoothTerm> term)
-      : term_(std::move(term)),
-        function_(term_->shape().substr(0, term_->shape().rfind(kTilt.words()))) {}
+  explicit BaseTilt(std::unique_ptr<SmoothTerm> of_h)
+      : WrappedTerm(std::move(of_h)),
+        function_(term().shape().substr(0, term().shape().rfind(kTilt.words()))) {}
 
-  std::string id() const override { return term_->id(); }
-  const std::string& driver() const override { return term_->driver(); }
-  TermForm form() const override { return TermForm::geometry; }
-  std::string shape() const override { return term_->shape(); }
-  Subject subject() const override { return Subject::head; }
-  bool remembers() const override { return term_->remembers(); }
-  bool guesses_at_start() const override { return term_->guesses_at_start(); }
-  std::vector<std::string> columns() const override { return term_->columns(); }
   std::vector<ParameterInfo> parameters() const override {
     constexpr double kFine_deg = 0.1;
-    std::vector<ParameterInfo> infos = term_->parameters();
+    std::vector<ParameterInfo> infos = term().parameters();
     infos.push_back({.name = "direction",
                      .unit = "deg",
                      .role = ParameterRole::shape,
@@ -40,23 +33,23 @@ class BaseTilt final : public SmoothTerm {
   /// Along the axes of the base it is a function of h or of the roll.
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     std::vector<Hypothesis> starts;
-    for (const Hypothesis& of_term : term_->hypotheses(log, axis))
+    for (const Hypothesis& of_term : term().hypotheses(log, axis))
       for (const double direction_deg : {-45.0, 45.0})
         starts.push_back(towards(of_term, direction_deg));
     return starts;
   }
   std::optional<std::size_t> sets_in_at(const VisitLog& log,
                                         const std::vector<double>& p) const override {
-    return term_->sets_in_at(log, p);
+    return term().sets_in_at(log, p);
   }
   double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {
-    return k + 1 < p.size() ? term_->choice_uncertainty(log, axis, p, k) : 0;
+    return k + 1 < p.size() ? term().choice_uncertainty(log, axis, p, k) : 0;
   }
   std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
                                  const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
-    for (const Hypothesis& of_term : term_->closer(log, axis, found))
+    for (const Hypothesis& of_term : term().closer(log, axis, found))
       others.push_back(towards(of_term, found.p.back()));
     return others;
   }
@@ -70,13 +63,13 @@ class BaseTilt final : public SmoothTerm {
     const auto* tilted = dynamic_cast<const BaseTilt*>(&repeated);
     if (tilted != nullptr && tilted != this) {
       if (remembers()) return found;  // a little nearer, but far more than one function
-      for (const Hypothesis& of_term : term_->hypotheses(log, axis))
+      for (const Hypothesis& of_term : term().hypotheses(log, axis))
         found.push_back(towards(of_term, p.front().back()));
       return found;
     }
     const auto* other = dynamic_cast<const SmoothTerm*>(&repeated);
     if (other == nullptr || other->driver() != driver() ||
-        p.front().size() != term_->parameters().size())
+        p.front().size() != term().parameters().size())
       return found;
     for (const double axis_deg : {0.0, kRoll_deg})
       if (other->shape() == function_ + (axis_deg == 0 ? kH : kRoll).words())
@@ -86,24 +79,24 @@ class BaseTilt final : public SmoothTerm {
   }
   std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t axis,
                                         const double* p) const override {
-    return term_->numbers_of_visits(log, axis, p);
+    return term().numbers_of_visits(log, axis, p);
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     HeadGeometry by;
-    term_->displace(log, visit, p, by);
+    term().displace(log, visit, p, by);
     tilt(by, p, head);
   }
   void displace_by_number(const VisitLog& log, std::size_t visit, double number, const double* p,
                           HeadGeometry& head) const override {
     HeadGeometry by;
-    term_->displace_by_number(log, visit, number, p, by);
+    term().displace_by_number(log, visit, number, p, by);
     tilt(by, p, head);
   }
   void normalise(std::vector<double>& p) const override {
     const double turned_deg = std::remainder(p.back(), 180);
     if (std::abs(std::remainder(p.back() - turned_deg, 360)) > 90) {
-      const auto infos = term_->parameters();
+      const auto infos = term().parameters();
       for (std::size_t k = 0; k < infos.size(); ++k)
         if (infos[k].role == ParameterRole::amplitude) p[k] = -p[k];
     }
@@ -117,13 +110,12 @@ class BaseTilt final : public SmoothTerm {
     return hypothesis;
   }
   void tilt(const HeadGeometry& by, const double* p, HeadGeometry& head) const {
-    const double direction_rad = p[term_->parameters().size()] * kRadPerDeg;
+    const double direction_rad = p[term().parameters().size()] * kRadPerDeg;
     const double cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
     head.h_rad += by.h_rad * cosine;
     head.roll_rad += by.h_rad * sine;
   }
 
-  std::unique_ptr<SmoothTerm> term_;
   std::string function_;  ///< without what it acts on
 };
 

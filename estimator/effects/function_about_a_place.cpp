@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <iterator>
 #include <map>
 #include <numbers>
@@ -57,6 +58,18 @@ class AboutAPlace : public DrivenTerm {
     return {place("middle"),
             {"width", variable().unit(), ParameterRole::shape},
             {"p", target().unit(), ParameterRole::amplitude}};
+  }
+
+ protected:
+  /// Everywhere from one end of the range to the other, with widths as shares of it.
+  std::vector<Hypothesis> everywhere(int places, std::initializer_list<double> shares) const {
+    const auto [low, high] = range();
+    std::vector<Hypothesis> starts;
+    for (int k = 0; k <= places; ++k)
+      for (const double share : shares)
+        starts.push_back(
+            {{low + (high - low) * k / places, share * (high - low), target().typical_size()}});
+    return starts;
   }
 };
 
@@ -135,14 +148,7 @@ class Resonance final : public AboutAPlace {
   using AboutAPlace::AboutAPlace;
 
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr int kPlaces = 16;
-    const auto [low, high] = range();
-    std::vector<Hypothesis> starts;
-    for (int k = 0; k <= kPlaces; ++k)
-      for (const double share : {0.03, 0.1})
-        starts.push_back(
-            {{low + (high - low) * k / kPlaces, share * (high - low), target().typical_size()}});
-    return starts;
+    return everywhere(16, {0.03, 0.1});
   }
 
  private:
@@ -159,14 +165,7 @@ class Passage final : public AboutAPlace {
   using AboutAPlace::AboutAPlace;
 
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr int kPlaces = 24;
-    const auto [low, high] = range();
-    std::vector<Hypothesis> starts;
-    for (int k = 0; k <= kPlaces; ++k)
-      for (const double share : {0.02, 0.06})
-        starts.push_back(
-            {{low + (high - low) * k / kPlaces, share * (high - low), target().typical_size()}});
-    return starts;
+    return everywhere(24, {0.02, 0.06});
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "estimator/effects/function_of_driver.h"
+#include "estimator/effects/wrapped_term.h"
 
 namespace plumbline {
 namespace {
@@ -16,27 +17,19 @@ struct Axis {
 };
 
 /// The parameters are those of the term, with one for each axis in the place of each amplitude.
-class TurnAboutAxes final : public SmoothTerm {
+class TurnAboutAxes final : public WrappedTerm {
  public:
   /// `moves`: the angle that the term displaces.
-  TurnAboutAxes(std::unique_ptr<SmoothTerm> term, double HeadGeometry::*moves,
+  TurnAboutAxes(std::unique_ptr<SmoothTerm> of_one, double HeadGeometry::*moves,
                 std::vector<Axis> axes)
-      : term_(std::move(term)), moves_(moves), axes_(std::move(axes)) {
-    for (const ParameterInfo& info : term_->parameters())
+      : WrappedTerm(std::move(of_one)), moves_(moves), axes_(std::move(axes)) {
+    for (const ParameterInfo& info : term().parameters())
       is_amplitude_.push_back(info.role == ParameterRole::amplitude);
   }
 
-  std::string id() const override { return term_->id(); }
-  const std::string& driver() const override { return term_->driver(); }
-  TermForm form() const override { return TermForm::geometry; }
-  std::string shape() const override { return term_->shape(); }
-  Subject subject() const override { return Subject::head; }
-  bool remembers() const override { return term_->remembers(); }
-  bool guesses_at_start() const override { return term_->guesses_at_start(); }
-  std::vector<std::string> columns() const override { return term_->columns(); }
   std::vector<ParameterInfo> parameters() const override {
     std::vector<ParameterInfo> infos;
-    for (const ParameterInfo& info : term_->parameters()) {
+    for (const ParameterInfo& info : term().parameters()) {
       if (info.role != ParameterRole::amplitude) {
         infos.push_back(info);
         continue;
@@ -50,24 +43,24 @@ class TurnAboutAxes final : public SmoothTerm {
     return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    return about_axes(term_->hypotheses(log, axis));
+    return about_axes(term().hypotheses(log, axis));
   }
   std::optional<std::size_t> sets_in_at(const VisitLog& log,
                                         const std::vector<double>& p) const override {
-    return term_->sets_in_at(log, about(axes_.size() - 1, p.data()));
+    return term().sets_in_at(log, about(axes_.size() - 1, p.data()));
   }
   double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {
     std::size_t of_term = 0, at = 0;
     while (of_term < is_amplitude_.size() && at + width(of_term) <= k) at += width(of_term++);
     if (of_term == is_amplitude_.size() || is_amplitude_[of_term]) return 0;
-    return term_->choice_uncertainty(log, axis, about(axes_.size() - 1, p.data()), of_term);
+    return term().choice_uncertainty(log, axis, about(axes_.size() - 1, p.data()), of_term);
   }
   /// About the same axes.
   std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
                                  const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
-    for (const Hypothesis& of_term : term_->closer(log, axis, {about(1, found.p.data())})) {
+    for (const Hypothesis& of_term : term().closer(log, axis, {about(1, found.p.data())})) {
       std::vector<double> p = found.p;
       std::size_t at = 0;
       for (std::size_t k = 0; k < is_amplitude_.size(); ++k) {
@@ -105,7 +98,7 @@ class TurnAboutAxes final : public SmoothTerm {
                 HeadGeometry& head) const override {
     for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
       HeadGeometry by;
-      term_->displace(log, visit, about(axis, p).data(), by);
+      term().displace(log, visit, about(axis, p).data(), by);
       head.*axes_[axis].angle += by.*moves_;
     }
   }
@@ -131,7 +124,6 @@ class TurnAboutAxes final : public SmoothTerm {
     return all;
   }
 
-  std::unique_ptr<SmoothTerm> term_;
   double HeadGeometry::*moves_;
   std::vector<Axis> axes_;
   std::vector<bool> is_amplitude_;  ///< each of the term's parameters
