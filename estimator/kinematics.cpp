@@ -24,6 +24,21 @@ Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma) {
   return gamma * (turned.inverse() * on_table);
 }
 
+Eigen::Vector3d slope_g_per_rad(const HeadGeometry& head, double HeadGeometry::*angle,
+                                double gamma) {
+  constexpr double kStep_rad = 1e-5;
+  HeadGeometry above = head, below = head;
+  above.*angle += kStep_rad;
+  below.*angle -= kStep_rad;
+  return (specific_force_g(above, gamma) - specific_force_g(below, gamma)) / (2 * kStep_rad);
+}
+
+HorizontalAxes horizontal_axes(double delta_rad, double h_rad) {
+  const double sh = std::sin(h_rad), ch = std::cos(h_rad);
+  const double sd = std::sin(delta_rad), cd = std::cos(delta_rad);
+  return {{-sh * cd, sh * sd, ch}, {-sd, -cd, 0}};
+}
+
 SpecificForce specific_force(double delta_deg, double h_deg, double gamma) {
   const double sin_delta = std::sin(delta_deg * kRadPerDeg);
   const double cos_delta = std::cos(delta_deg * kRadPerDeg);

@@ -22,6 +22,16 @@ struct HeadGeometry {
 /// γ·(cos h cos δ, −cos h sin δ, sin h).
 Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma);
 
+/// ∂a/∂angle of one of the angles, g/rad, by a central difference.
+Eigen::Vector3d slope_g_per_rad(const HeadGeometry& head, double HeadGeometry::*angle,
+                                double gamma);
+
+/// The horizontal axes of the base, unit vectors, as an ideal head shows them to the triad.
+struct HorizontalAxes {
+  Eigen::Vector3d x_b, y_b;
+};
+HorizontalAxes horizontal_axes(double delta_rad, double h_rad);
+
 /// Specific force at rest in the sensor frame, in standard g, and how it changes with the angles.
 struct SpecificForce {
   Eigen::Vector3d a_g;

@@ -120,14 +120,9 @@ using PerAngle = Eigen::Matrix<double, kAxisCount, kAngles.size()>;
 
 /// What each angle does to the outputs of the three axes, V/rad.
 PerAngle slopes_V(const EnlargedParameters& model, const HeadGeometry& head, double gamma) {
-  constexpr double kStep_rad = 1e-4;
   PerAngle slopes;
   for (std::size_t angle = 0; angle < kAngles.size(); ++angle) {
-    HeadGeometry before = head, after = head;
-    before.*kAngles[angle] -= kStep_rad;
-    after.*kAngles[angle] += kStep_rad;
-    const Eigen::Vector3d per_rad =
-        (specific_force_g(after, gamma) - specific_force_g(before, gamma)) / (2 * kStep_rad);
+    const Eigen::Vector3d per_rad = slope_g_per_rad(head, kAngles[angle], gamma);
     for (std::size_t i = 0; i < kAxisCount; ++i)
       slopes(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(angle)) =
           model.twelve[i].head<3>().dot(per_rad);

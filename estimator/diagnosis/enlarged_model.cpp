@@ -69,13 +69,8 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
 HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometry& head,
                        const ActiveEffect& active) {
   const AngleCourse course = active.effect->angle_course(log, visit, active.p.data());
-  constexpr double kStep_rad = 1e-5;
-  HeadGeometry above = head, below = head;
-  above.*course.angle += kStep_rad;
-  below.*course.angle -= kStep_rad;
-  return {
-      log.contrasts.at(log.visits[visit].count).transpose() * course.course_rad,
-      (specific_force_g(above, log.gamma) - specific_force_g(below, log.gamma)) / (2 * kStep_rad)};
+  return {log.contrasts.at(log.visits[visit].count).transpose() * course.course_rad,
+          slope_g_per_rad(head, course.angle, log.gamma)};
 }
 
 namespace {

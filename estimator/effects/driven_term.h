@@ -82,6 +82,23 @@ class DrivenTerm : public SmoothTerm {
     return at(driver_->value[axis][visit], p);
   }
 
+  /// The last parameter of what has a mean that the 12 parameters do not hold.
+  void add_mean(std::vector<ParameterInfo>& infos) const {
+    if (!target_.mean_in_the_twelve())
+      infos.push_back({"p0", target_.unit(), ParameterRole::amplitude});
+  }
+  /// `p` without that mean, and with it where there is one.
+  void add_with_mean(std::vector<double> p, std::vector<Hypothesis>& starts) const {
+    if (target_.mean_in_the_twelve()) {
+      starts.push_back({std::move(p)});
+      return;
+    }
+    p.push_back(0);
+    starts.push_back({p});
+    p.back() = target_.typical_size();
+    starts.push_back({std::move(p)});
+  }
+  double mean(const double* p0) const { return target_.mean_in_the_twelve() ? 0 : *p0; }
   /// A place in the range.
   ParameterInfo place(const char* name) const {
     const auto [low, high] = range();

@@ -70,19 +70,6 @@ std::pair<double, double> about_zero(const PerAxis<std::vector<double>>& values)
   return {-most, most};
 }
 
-/// Sign of the last change of h, upwards before the first one.
-std::vector<double> direction_of_h(const VisitLog& log) {
-  constexpr double kMoved_rad = 1e-9;
-  std::vector<double> direction(log.visits.size(), 1);
-  for (std::size_t k = 0; k < direction.size(); ++k) {
-    const Visit* before = log.before(k);
-    if (before == nullptr) continue;
-    const double change_rad = log.visits[k].h_rad - before->h_rad;
-    direction[k] = std::abs(change_rad) < kMoved_rad ? direction[k - 1] : change_rad > 0 ? 1 : -1;
-  }
-  return direction;
-}
-
 /// What each axis has of its own, had from the next axis and from the one after that; their
 /// component stands between `before` and `after`.
 std::vector<Driver> of_other_axes(const Driver& own, const std::string& before,
@@ -196,8 +183,9 @@ std::vector<Driver> instantaneous_drivers(const VisitLog& log) {
                               : "direction of the last turn of delta within 360 degrees";
     direction.two_valued = true;
   }
-  const std::vector<double> h_direction = direction_of_h(log);
-  Driver& tilted = add("previous_pose", [&](std::size_t k) { return h_direction[k]; });
+  Driver& tilted = add("previous_pose", [&](std::size_t k) {
+    return last_direction_of_h(log, k) < 0 ? -1.0 : 1.0;  // upwards before the first one
+  });
   tilted.past = "direction of the last turn of h";
   tilted.two_valued = true;
   const auto add_way = [&](std::string past, const ValueAtVisit& value) {

@@ -1,5 +1,3 @@
-#include <cmath>
-
 #include "estimator/effects/effect.h"
 
 namespace plumbline {
@@ -21,12 +19,9 @@ class BaseField final : public Effect {
     return {{{effect::kSmallTerm, effect::kSmallTerm}}};
   }
   double term_g(const TermInput& input, const double* p) const override {
-    const Visit& visit = input.at();
-    const double sh = std::sin(visit.h_rad), ch = std::cos(visit.h_rad);
-    const double sd = std::sin(visit.delta_rad), cd = std::cos(visit.delta_rad);
-    const double e1[] = {-sh * cd, sh * sd, ch};
-    const double e2[] = {-sd, -cd, 0};
-    return p[0] * e1[input.axis] + p[1] * e2[input.axis];
+    const HorizontalAxes seen = horizontal_axes(input.at().delta_rad, input.at().h_rad);
+    const auto i = static_cast<Eigen::Index>(input.axis);
+    return p[0] * seen.x_b(i) + p[1] * seen.y_b(i);
   }
 };
 

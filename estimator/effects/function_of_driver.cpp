@@ -322,22 +322,16 @@ class Power final : public DrivenTerm {
                                         {"end", variable().unit(), ParameterRole::index},
                                         {"power", "", ParameterRole::shape},
                                         {"p", target().unit(), ParameterRole::amplitude}};
-    if (!target().mean_in_the_twelve())
-      infos.push_back({"p0", target().unit(), ParameterRole::amplitude});
+    add_mean(infos);
     return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    const double high = range().second, size = target().typical_size();
+    const double high = range().second;
     std::vector<Hypothesis> starts;
     for (const double beginning : beginnings())
-      for (const double power : {0.5, 2.0}) {
-        if (!(high > beginning)) continue;
-        if (target().mean_in_the_twelve())
-          starts.push_back({{beginning, high, power, size}});
-        else
-          for (const double mean : {0.0, size})
-            starts.push_back({{beginning, high, power, size, mean}});
-      }
+      for (const double power : {0.5, 2.0})
+        if (high > beginning)
+          add_with_mean({beginning, high, power, target().typical_size()}, starts);
     return starts;
   }
 
@@ -345,8 +339,7 @@ class Power final : public DrivenTerm {
   std::string function() const override { return "power"; }
   double at(double value, const double* p) const override {
     const double share = (value - p[0]) / (p[1] - p[0]);
-    const double mean = target().mean_in_the_twelve() ? 0 : p[4];
-    return mean + (share > 0 && p[2] > 0 ? p[3] * std::pow(share, p[2]) : 0);
+    return mean(p + 4) + (share > 0 && p[2] > 0 ? p[3] * std::pow(share, p[2]) : 0);
   }
 };
 

@@ -35,8 +35,9 @@ struct Target {
   double factor_at(const Visit& visit) const;
 };
 
-/// The angles of head and base; the tilt of the base is for towards_a_direction(), what turns the
-/// triad in its seat for about_some_axis().
+inline constexpr Target kBias{}, kScale{.form = TermForm::scale};
+/// The angles of head and base; the tilt of the base is for towards_a_direction() and
+/// in_both_directions(), what turns the triad in its seat for about_some_axis().
 inline constexpr Target kDelta{.form = TermForm::geometry};
 inline constexpr Target kH{.form = TermForm::geometry, .angle = &HeadGeometry::h_rad};
 inline constexpr Target kRoll{.form = TermForm::geometry, .angle = &HeadGeometry::roll_rad};

@@ -135,12 +135,9 @@ class LineTimesField final : public DrivenTerm {
   std::string function() const override { return "straight line, times a field of the base"; }
   double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
     const double x = position(variable().value[axis][visit], p[0], p[1]);
-    const double delta_rad = delta_->value[axis][visit], h_rad = h_->value[axis][visit];
-    // x_b and y_b seen along the axis.
-    const std::array x_b = {-std::sin(h_rad) * std::cos(delta_rad),
-                            std::sin(h_rad) * std::sin(delta_rad), std::cos(h_rad)};
-    const std::array y_b = {-std::sin(delta_rad), -std::cos(delta_rad), 0.0};
-    return (p[2] + p[4] * x) * x_b[axis] + (p[3] + p[5] * x) * y_b[axis];
+    const HorizontalAxes seen = horizontal_axes(delta_->value[axis][visit], h_->value[axis][visit]);
+    const auto i = static_cast<Eigen::Index>(axis);
+    return (p[2] + p[4] * x) * seen.x_b(i) + (p[3] + p[5] * x) * seen.y_b(i);
   }
 
   DriverPointer delta_, h_;

@@ -191,30 +191,21 @@ class HalfWave final : public DrivenTerm {
     std::vector<ParameterInfo> infos = {
         {"middle", "rad", ParameterRole::shape, kFine_rad, true},
         {.name = "p", .unit = target().unit(), .role = ParameterRole::amplitude, .needed = true}};
-    if (!target().mean_in_the_twelve())
-      infos.push_back({"p0", target().unit(), ParameterRole::amplitude});
+    add_mean(infos);
     return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     constexpr int kParts = 12;
-    const double size = target().typical_size();
     std::vector<Hypothesis> starts;
-    for (int k = 0; k < kParts; ++k) {
-      std::vector<double> p = {effect::kTurn_rad * k / kParts, size};
-      if (!target().mean_in_the_twelve()) p.push_back(0);
-      starts.push_back({p});
-      if (target().mean_in_the_twelve()) continue;
-      p.back() = size;
-      starts.push_back({std::move(p)});
-    }
+    for (int k = 0; k < kParts; ++k)
+      add_with_mean({effect::kTurn_rad * k / kParts, target().typical_size()}, starts);
     return starts;
   }
 
  private:
   std::string function() const override { return "half a wave"; }
   double at(double value, const double* p) const override {
-    const double mean = target().mean_in_the_twelve() ? 0 : p[2];
-    return mean + p[1] * std::max(0.0, std::cos(value - p[0]));
+    return mean(p + 2) + p[1] * std::max(0.0, std::cos(value - p[0]));
   }
 };
 

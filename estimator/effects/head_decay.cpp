@@ -38,27 +38,16 @@ class SetOff : public HeadInDwell {
       case SetOffBy::weight:
         return std::cos(at.h_rad) * kRadPerDeg;
       case SetOffBy::way:
-        return log.before(visit) ? back_rad(log, visit) : 0;
+        if (log.before(visit) == nullptr) return 0;
+        return is_delta() ? shorter_turn_rad(at, *log.before(visit))
+                          : log.before(visit)->h_rad - at.h_rad;
       case SetOffBy::direction:
-        return is_delta() ? -at.delta_direction[0] * kRadPerDeg : last_of_h_rad(log, visit);
+        return -kRadPerDeg * (is_delta() ? at.delta_direction[0] : last_direction_of_h(log, visit));
     }
     return kRadPerDeg;
   }
 
  private:
-  double back_rad(const VisitLog& log, std::size_t visit) const {
-    const Visit &at = log.visits[visit], &before = *log.before(visit);
-    return is_delta() ? shorter_turn_rad(at, before) : before.h_rad - at.h_rad;
-  }
-  /// Back from where h went last, if only the spindle has moved since.
-  double last_of_h_rad(const VisitLog& log, std::size_t visit) const {
-    constexpr double kMoved_rad = 1e-9;
-    for (; log.before(visit) != nullptr; --visit)
-      if (const double back = back_rad(log, visit); std::abs(back) > kMoved_rad)
-        return std::copysign(kRadPerDeg, back);
-    return 0;
-  }
-
   SetOffBy by_;
 };
 

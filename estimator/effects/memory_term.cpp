@@ -170,8 +170,6 @@ class Memory {
   mutable std::vector<std::vector<std::vector<double>>> table_;  // by time constant
 };
 
-constexpr Target kBias{};
-
 class MemoryTerm final : public SmoothTerm {
  public:
   MemoryTerm(std::shared_ptr<const Memory> memory, Target target, double longest_s)

@@ -61,8 +61,6 @@ Driver angle_without_return(const VisitLog& log) {
   return driver;
 }
 
-const Target kBias{TermForm::bias}, kScale{TermForm::scale};
-
 /// An angle that follows the load as it turns with the tilt.
 std::array<Target, 2> pulled(const Target& angle) {
   Target by_cosine = angle, by_sine = angle;
@@ -321,14 +319,14 @@ class TermList {
         add(line_times_harmonic(driver, angle, kBias));
         add(line_times_harmonic(driver, angle, angle->angle ? kDelta : kH));
       }
+    if (angles_.size() == 2)
+      for (const DriverPointer& driver : followed)
+        if (driver != angles_[1]) add(line_times_field(driver, angles_[0], angles_[1], kBias));
     // A play that the load takes up, which turns with the spindle.
     for (const DriverPointer& direction : directions_)
       if (!angles_.empty() && angles_[0]->angle)
         add(line_times_harmonic(direction, angles_[0], kDelta));
     // What the weight does to a wheel grows with its moment about the axis, which need be no line.
-    if (angles_.size() == 2)
-      for (const DriverPointer& driver : followed)
-        if (driver != angles_[1]) add(line_times_field(driver, angles_[0], angles_[1], kBias));
     if (angles_.size() == 2) add(parabola_times_harmonic(angles_[1], angles_[0], kDelta));
     for (std::size_t one = 0; one < columns_.size(); ++one)
       for (std::size_t other = one + 1; other < columns_.size(); ++other)
@@ -346,9 +344,8 @@ class TermList {
   }
   /// What goes with the direction of the last move, and not always alike.
   void add_of_directions() {
-    const auto sign = shared(sign_of_load(log_));
     if (!clock_) return;
-    add(fading_reversal(sign, clock_, kBias));
+    add(fading_reversal(shared(sign_of_load(log_)), clock_, kBias));
     for (const DriverPointer& direction : directions_) {
       const Target& angle = direction->past.ends_with("of h") ? kH : kDelta;
       for (const Target& target : {kBias, angle}) add(fading_reversal(direction, clock_, target));

@@ -23,76 +23,73 @@ class TurnAboutAxes final : public WrappedTerm {
   TurnAboutAxes(std::unique_ptr<SmoothTerm> of_one, double HeadGeometry::*moves,
                 std::vector<Axis> axes)
       : WrappedTerm(std::move(of_one)), moves_(moves), axes_(std::move(axes)) {
-    for (const ParameterInfo& info : term().parameters())
-      is_amplitude_.push_back(info.role == ParameterRole::amplitude);
+    const std::vector<ParameterInfo> infos = term().parameters();
+    for (std::size_t k = 0; k < infos.size(); ++k) {
+      if (infos[k].role != ParameterRole::amplitude)
+        own_.push_back({k, {}});
+      else
+        for (std::size_t axis = 0; axis < axes_.size(); ++axis) own_.push_back({k, axis});
+    }
   }
 
   std::vector<ParameterInfo> parameters() const override {
+    const std::vector<ParameterInfo> of_term = term().parameters();
     std::vector<ParameterInfo> infos;
-    for (const ParameterInfo& info : term().parameters()) {
-      if (info.role != ParameterRole::amplitude) {
-        infos.push_back(info);
-        continue;
-      }
-      for (const Axis& axis : axes_) {
-        infos.push_back(info);
-        infos.back().name += axis.suffix;
-        infos.back().needed = false;  // about one axis it may do nothing
-      }
+    for (const Own& own : own_) {
+      infos.push_back(of_term[own.of_term]);
+      if (!own.axis) continue;
+      infos.back().name += axes_[*own.axis].suffix;
+      infos.back().needed = false;  // about one axis it may do nothing
     }
     return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
-    return about_axes(term().hypotheses(log, axis));
+    std::vector<Hypothesis> all;
+    for (const Hypothesis& of_term : term().hypotheses(log, axis)) {
+      Hypothesis& about_all = all.emplace_back();
+      for (const Own& own : own_) about_all.p.push_back(of_term.p[own.of_term]);
+    }
+    return all;
   }
   std::optional<std::size_t> sets_in_at(const VisitLog& log,
                                         const std::vector<double>& p) const override {
-    return term().sets_in_at(log, about(axes_.size() - 1, p.data()));
+    return term().sets_in_at(log, about(0, p.data()));
   }
   double choice_uncertainty(const VisitLog& log, std::size_t axis, const std::vector<double>& p,
                             std::size_t k) const override {
-    std::size_t of_term = 0, at = 0;
-    while (of_term < is_amplitude_.size() && at + width(of_term) <= k) at += width(of_term++);
-    if (of_term == is_amplitude_.size() || is_amplitude_[of_term]) return 0;
-    return term().choice_uncertainty(log, axis, about(axes_.size() - 1, p.data()), of_term);
+    if (own_[k].axis) return 0;
+    return term().choice_uncertainty(log, axis, about(0, p.data()), own_[k].of_term);
   }
   /// About the same axes.
   std::vector<Hypothesis> closer(const VisitLog& log, std::size_t axis,
                                  const Hypothesis& found) const override {
     std::vector<Hypothesis> others;
-    for (const Hypothesis& of_term : term().closer(log, axis, {about(1, found.p.data())})) {
-      std::vector<double> p = found.p;
-      std::size_t at = 0;
-      for (std::size_t k = 0; k < is_amplitude_.size(); ++k) {
-        if (!is_amplitude_[k]) p[at] = of_term.p[k];
-        at += width(k);
-      }
-      others.push_back({std::move(p)});
+    for (const Hypothesis& of_term : term().closer(log, axis, {about(0, found.p.data())})) {
+      Hypothesis& other = others.emplace_back(found);
+      for (std::size_t k = 0; k < own_.size(); ++k)
+        if (!own_[k].axis) other.p[k] = of_term.p[own_[k].of_term];
     }
     return others;
   }
-  /// What one angle seemed to do by itself, or in one direction.
+  /// What one angle seemed to do by itself.
   std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
                                  const std::vector<std::vector<double>>& p) const override {
     constexpr double kOfTheOther = 0.2;
+    std::vector<Hypothesis> found;
     const auto* other = dynamic_cast<const SmoothTerm*>(&repeated);
     if (other == nullptr || other == this || moves_ != kTilt.angle || p.size() != 1 ||
-        other->driver() != driver() || p.front().size() != is_amplitude_.size())
-      return {};
+        other->driver() != driver() || p.front().size() != term().parameters().size())
+      return found;
     const std::string function = shape().substr(0, shape().rfind(kTilt.words()));
-    std::vector<double> both;
     for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
       const Target along{.form = TermForm::geometry, .angle = axes_[axis].angle};
       if (other->shape() != function + along.words()) continue;
-      for (std::size_t k = 0; k < is_amplitude_.size(); ++k) {
-        const std::size_t first = both.size();
-        both.insert(both.end(), width(k), p.front()[k]);
-        for (std::size_t a = 0; is_amplitude_[k] && a < axes_.size(); ++a)
-          if (a != axis) both[first + a] *= kOfTheOther;
-      }
+      Hypothesis& both = found.emplace_back();
+      for (const Own& own : own_)
+        both.p.push_back(p.front()[own.of_term] *
+                         (own.axis.value_or(axis) == axis ? 1 : kOfTheOther));
     }
-    if (both.empty()) return {};
-    return {{std::move(both)}};
+    return found;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
@@ -104,29 +101,23 @@ class TurnAboutAxes final : public WrappedTerm {
   }
 
  private:
-  std::size_t width(std::size_t k) const { return is_amplitude_[k] ? axes_.size() : 1; }
+  /// Which of the term's parameters one is, and about which axis; none where all share it.
+  struct Own {
+    std::size_t of_term;
+    std::optional<std::size_t> axis;
+  };
   /// The term's own parameters where it turns about one of the axes.
   std::vector<double> about(std::size_t axis, const double* p) const {
     std::vector<double> of_term;
-    of_term.reserve(is_amplitude_.size());
-    for (std::size_t k = 0; k < is_amplitude_.size(); p += width(k++))
-      of_term.push_back(is_amplitude_[k] ? p[axis] : *p);
+    of_term.reserve(own_.size());
+    for (std::size_t k = 0; k < own_.size(); ++k)
+      if (own_[k].axis.value_or(axis) == axis) of_term.push_back(p[k]);
     return of_term;
-  }
-  std::vector<Hypothesis> about_axes(const std::vector<Hypothesis>& of_term) const {
-    std::vector<Hypothesis> all;
-    for (const Hypothesis& hypothesis : of_term) {
-      std::vector<double> p;
-      for (std::size_t k = 0; k < is_amplitude_.size(); ++k)
-        p.insert(p.end(), width(k), hypothesis.p[k]);
-      all.push_back({std::move(p)});
-    }
-    return all;
   }
 
   double HeadGeometry::*moves_;
   std::vector<Axis> axes_;
-  std::vector<bool> is_amplitude_;  ///< each of the term's parameters
+  std::vector<Own> own_;
 };
 
 }  // namespace

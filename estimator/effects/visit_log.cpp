@@ -194,6 +194,15 @@ double shorter_turn_rad(const Visit& from, const Visit& to) {
   return std::remainder(commanded_turn_rad(from, to), 2 * std::numbers::pi);
 }
 
+int last_direction_of_h(const VisitLog& log, std::size_t visit) {
+  constexpr double kMoved_rad = 1e-9;
+  for (; log.before(visit) != nullptr; --visit) {
+    const double change_rad = log.visits[visit].h_rad - log.before(visit)->h_rad;
+    if (std::abs(change_rad) >= kMoved_rad) return change_rad > 0 ? 1 : -1;
+  }
+  return 0;
+}
+
 std::array<int, 3> direction_after(const Visit& before, double delta_rad) {
   constexpr double kStill_rad = 1e-9;  // degrees that became radians and came back
   std::array<int, 3> direction = before.delta_direction;

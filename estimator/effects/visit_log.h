@@ -117,6 +117,9 @@ inline double commanded_turn_rad(const Visit& from, const Visit& to) {
   return to.delta_rad - from.delta_rad;
 }
 
+/// Sign of the last turn of h that led to a visit; 0 before the first one.
+int last_direction_of_h(const VisitLog& log, std::size_t visit);
+
 /// Visit::delta_direction of a visit at `delta_rad` that comes next after `before`.
 std::array<int, 3> direction_after(const Visit& before, double delta_rad);
 

@@ -369,14 +369,15 @@ TEST(Findings, NothingIsAskedBeyondTheLimitsOfAHead) {
   const FoundEffect& found = limited.diagnosis.effects.front();
   EXPECT_FALSE(found.alternatives.empty());
   EXPECT_THAT(found.separate_by, HasSubstr("mount the triad"));
+  ASSERT_FALSE(found.separating_plan.stops.empty());  // from what has no name
   for (const SeparatingPlan::Stop& stop : found.separating_plan.stops) {
     EXPECT_GE(stop.h_deg, 0);
     EXPECT_LE(stop.h_deg, 80);
   }
 }
 
-// Where temperature and attitude go together, what a temperature does to a bias it may do to the
-// scale by another axis; and what differs only after other ways counts too.
+// While a mass that sticks is drawn one way only it is hysteresis: after short ways back and forth
+// it would not be.
 TEST(Findings, WhatHasNoNameMayStandInThePlaceOfOneWherePosesTell) {
   SyntheticOptions options;
   options.delta_step_deg = 10;
