@@ -67,7 +67,6 @@ std::vector<std::string> columns_behind(const std::string& driver, const RunHist
 
 void restore(const Effect& effect, const std::vector<std::size_t>& axes,
              const std::vector<EffectParameter>& reported, EnlargedParameters& model) {
-  if (!effect.carries_over()) return;
   const bool head = effect.subject() == Subject::head;
   for (std::size_t axis : head ? std::vector<std::size_t>{0} : axes)
     for (ActiveEffect& active : instances(effect, axis, reported))
@@ -76,7 +75,7 @@ void restore(const Effect& effect, const std::vector<std::size_t>& axes,
 
 }  // namespace
 
-RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
+RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log, RestoredFor use) {
   RestoredModel restored;
   EnlargedParameters& parameters = restored.parameters;
   for (std::size_t i = 0; i < kAxisCount; ++i) parameters.twelve[i] = model.final[i].value;
@@ -86,7 +85,8 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log) {
   for (const FoundEffect& found : model.effects) {
     const std::size_t before = parameters.effects.size();
     for (const Effect* effect : named)
-      if (effect->id() == found.id && has_columns(effect->columns(), log, restored))
+      if (effect->id() == found.id && (effect->carries_over() || use == RestoredFor::its_run) &&
+          has_columns(effect->columns(), log, restored))
         restore(*effect, found.axes, found.parameters, parameters);
     for (const auto& effect : restored.owned) {
       // Bias and scale form of a column share the id; the unit of c tells them apart.

@@ -18,6 +18,9 @@ struct RestoredModel {
   std::vector<std::string> left_out;
   std::vector<std::string> lacking;  ///< columns that effects among them need
 };
-RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log);
+/// What happened to single poses of a run is part of the model on that run alone.
+enum class RestoredFor { any_set, its_run };
+RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log,
+                            RestoredFor use = RestoredFor::any_set);
 
 }  // namespace plumbline

@@ -30,6 +30,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -165,8 +166,10 @@ struct SetOutcome : Claims {
   Errors before, after, oracle;
   double plain_oracle_fresh = 0;  ///< ordinary least squares without the effect
   double told_fresh = 0;          ///< of one who is told which effect there is
-  double evaluated_fresh = 0;     ///< evaluate() on the fresh poses as a file of their own
-  double seconds = 0;             ///< of calibrate()
+  /// By how much the run's readings favour what is true over what was found (criterion_of()).
+  double truth_ahead = 0;
+  double evaluated_fresh = 0;  ///< evaluate() on the fresh poses as a file of their own
+  double seconds = 0;          ///< of calibrate()
 
   Claims naive;            ///< of the naive search
   double naive_fresh = 0;  ///< its error after
@@ -181,9 +184,16 @@ Claims check_claims(const SetDesign& design, const StudySet& set, const Diagnosi
 PerAxis<Eigen::Vector4d> true_twelve(const StudySet& set);
 /// Fills the oracle's errors.
 void score_oracle(const StudySet& set, SetOutcome& outcome);
-/// Error on the fresh poses of one who is told the effects, m/s²; NaN where the estimator does not
-/// consider a listed one with these readings.
-double told_fresh_mps2(const SetDesign& design, const StudySet& set);
+/// One who is told the effects and estimates them from the same readings, under the true noise; NaN
+/// where the estimator does not consider a listed one with these readings.
+struct Told {
+  double fresh_mps2 = std::numeric_limits<double>::quiet_NaN();  ///< error on the fresh poses
+  double criterion = std::numeric_limits<double>::quiet_NaN();   ///< as criterion_of()
+};
+Told told_effects(const SetDesign& design, const StudySet& set);
+/// -2 ln L of the run's readings under what was found and the true noise, but for a constant, and
+/// ln of the number of means for each parameter (Schwarz, 1978).
+double criterion_of(const StudySet& set, const Calibration& calibration);
 /// Error of a model on the fresh poses that count; `poses` and `log` are those of the session.
 double fresh_error_mps2(const StudySet& set, const std::vector<PoseMean>& poses,
                         const VisitLog& log, const EnlargedParameters& model);

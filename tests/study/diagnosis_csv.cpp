@@ -110,6 +110,7 @@ const std::vector<Column>& columns() {
       number("ordinary_oracle_fresh_mps2", "{:.6f}",
              [](auto& o) { return std::ref(o.plain_oracle_fresh); }),
       number("told_fresh_mps2", "{:.6f}", [](auto& o) { return std::ref(o.told_fresh); }),
+      number("truth_ahead", "{:.1f}", [](auto& o) { return std::ref(o.truth_ahead); }),
       number("evaluated_fresh_mps2", "{:.6f}", [](auto& o) { return std::ref(o.evaluated_fresh); }),
       number("before_heldout_mps2", "{:.6f}", [](auto& o) { return std::ref(o.before.heldout); }),
       number("after_heldout_mps2", "{:.6f}", [](auto& o) { return std::ref(o.after.heldout); }),

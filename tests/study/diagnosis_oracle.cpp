@@ -6,8 +6,10 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "estimator/diagnosis/enlarged_fit.h"
+#include "estimator/diagnosis/restored_model.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/error_figures.h"
@@ -66,6 +68,19 @@ PoseWhitening true_whitening(const StudySet& set, const VisitLog& log) {
         (whitening.dwell_sd_V[i].array() > 0).select(whitening.dwell_sd_V[i], 1);
   }
   return whitening;
+}
+
+/// The run as the estimator sees it, and the true noise of its readings.
+struct Readings {
+  VisitLog log;
+  Observations observed;
+  PoseWhitening whitening;
+};
+Readings readings_of(const StudySet& set) {
+  VisitLog log = make_visit_log(set.set.run, set.set.description);
+  Observations observed = observe(set.set.run, log);
+  PoseWhitening whitening = true_whitening(set, log);
+  return {std::move(log), std::move(observed), std::move(whitening)};
 }
 
 /// Root mean square over the fresh poses that count, which are the last of `all` poses.
@@ -143,11 +158,14 @@ void score_oracle(const StudySet& set, SetOutcome& outcome) {
 
 namespace {
 
+/// Schwarz's criterion of what is left of the run's readings, which are `rows`.
+double criterion(double chi2, Eigen::Index rows, Eigen::Index parameters) {
+  return chi2 + static_cast<double>(parameters) * std::log(static_cast<double>(rows));
+}
+
 /// By the estimator's models of the effects.
-double told_listed_mps2(const StudySet& set) {
-  const VisitLog log = make_visit_log(set.set.run, set.set.description);
-  const Observations observed = observe(set.set.run, log);
-  const PoseWhitening whitening = true_whitening(set, log);
+Told told_listed(const StudySet& set) {
+  const auto [log, observed, whitening] = readings_of(set);
   const auto of_columns = covariate_effects(log);
   EnlargedFit told;
   told.parameters.twelve = true_twelve(set);
@@ -162,67 +180,88 @@ double told_listed_mps2(const StudySet& set) {
           fit_holding_shapes(log, observed, whitening, with_effect(told.parameters, active), 0);
       if (fit.chi2 < best.chi2) best = std::move(fit);
     }
-    if (best.parameters.effects.empty()) return std::numeric_limits<double>::quiet_NaN();
+    if (best.parameters.effects.empty()) return {};
     told = std::move(best);
   }
+  const double left = criterion(
+      whitening.apply(stacked_V(observed) - predict_stacked_V(log, told.parameters)).squaredNorm(),
+      mean_rows(log), told.parameters.free_count());
   std::erase_if(told.parameters.effects,
                 [](const ActiveEffect& active) { return !active.effect->carries_over(); });
 
   const MeasurementSet all = session(set);
-  return fresh_error_mps2(set, pose_means(all), make_visit_log(all, set.set.description),
-                          told.parameters);
+  return {fresh_error_mps2(set, pose_means(all), make_visit_log(all, set.set.description),
+                           told.parameters),
+          left};
 }
 
-/// What the effects of the world do to the pose means, V.
-PerAxis<Eigen::VectorXd> change_V(const MeasurementSet& with, const MeasurementSet& without) {
-  const auto changed = pose_means(with);
-  const auto plain = pose_means(without);
-  PerAxis<Eigen::VectorXd> change;
-  for (std::size_t i = 0; i < kAxisCount; ++i)
-    change[i] = mean_voltages(changed, i) - mean_voltages(plain, i);
-  return change;
+/// What the 12 parameters do to the stacked readings.
+Eigen::MatrixXd twelve_columns(const StudySet& set, const VisitLog& log) {
+  const Eigen::MatrixXd A = design_matrix(pose_means(set.set.run), set.set.description.gravity);
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(stacked_rows(log), 4 * kAxisCount);
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    columns.block(axis * A.rows(), 4 * axis, A.rows(), 4) = A;
+  }
+  return columns;
 }
 
 /// By what the effects do, of which the amplitude is estimated.
-double told_response_mps2(const SetDesign& design, const StudySet& set) {
+Told told_response(const SetDesign& design, const StudySet& set) {
   sim::World plain = set.world;
   plain.effects.clear();
   const sim::RecordedSet with = record_without_noise(design, set.world);
   const sim::RecordedSet without = record_without_noise(design, plain);
-  const auto run_V = change_V(with.run, without.run);
-  const auto fresh_V = change_V(with.verification, without.verification);
-  const auto poses = pose_means(set.set.run);
+  const auto [log, observed, whitening] = readings_of(set);
+  Eigen::MatrixXd columns(stacked_rows(log), 13);
+  columns.leftCols(12) = twelve_columns(set, log);
+  columns.col(12) = stacked_V(observe(with.run, log)) - stacked_V(observe(without.run, log));
+  const Eigen::MatrixXd whitened = whitening.apply(columns);
+  const Eigen::VectorXd y = whitening.apply(stacked_V(observed));
+  const Eigen::VectorXd told = solve_least_squares(whitened, y).x;
+
   const auto fresh = pose_means(set.set.verification);
-  const Eigen::MatrixXd A = design_matrix(poses, set.set.description.gravity);
   const Eigen::MatrixXd A_fresh = design_matrix(fresh, set.set.description.gravity);
-
-  const Eigen::Index n = A.rows();
-  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(3 * n, 13);
-  Eigen::VectorXd y(3 * n);
-  for (std::size_t i = 0; i < kAxisCount; ++i) {
-    const auto axis = static_cast<Eigen::Index>(i);
-    const Eigen::LLT<Eigen::MatrixXd> factor(set.covariance_V2[i]);
-    columns.block(axis * n, 4 * axis, n, 4) = factor.matrixL().solve(A);
-    columns.block(axis * n, 12, n, 1) = factor.matrixL().solve(run_V[i]);
-    y.segment(axis * n, n) = factor.matrixL().solve(mean_voltages(poses, i));
-  }
-  const Eigen::VectorXd told = solve_least_squares(columns, y).x;
-
+  const auto fresh_with = pose_means(with.verification);
+  const auto fresh_without = pose_means(without.verification);
   PerAxis<double> mps2{};
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const AxisEstimate twelve{told.segment<4>(4 * static_cast<Eigen::Index>(i)),
                               Eigen::Matrix4d::Zero()};
     mps2[i] = fresh_rms(
         set, input_referred_mps2_per_V(twelve, i) *
-                 (mean_voltages(fresh, i) - A_fresh * twelve.value - told(12) * fresh_V[i]));
+                 (mean_voltages(fresh, i) - A_fresh * twelve.value -
+                  told(12) * (mean_voltages(fresh_with, i) - mean_voltages(fresh_without, i))));
   }
-  return over_axes(mps2);
+  return {over_axes(mps2),
+          criterion((y - whitened * told).squaredNorm(), mean_rows(log), told.size())};
 }
 
 }  // namespace
 
-double told_fresh_mps2(const SetDesign& design, const StudySet& set) {
-  return kind_of(design) == SetKind::own ? told_response_mps2(design, set) : told_listed_mps2(set);
+Told told_effects(const SetDesign& design, const StudySet& set) {
+  return kind_of(design) == SetKind::own ? told_response(design, set) : told_listed(set);
+}
+
+double criterion_of(const StudySet& set, const Calibration& calibration) {
+  const auto [log, observed, whitening] = readings_of(set);
+  const RestoredModel found =
+      restore_model(certified_model(calibration), log, RestoredFor::its_run);
+  Eigen::Index parameters = 12;
+  const auto count_estimated = [&parameters](const std::vector<EffectParameter>& reported) {
+    parameters += std::count_if(reported.begin(), reported.end(),
+                                [](const EffectParameter& p) { return p.estimated; });
+  };
+  for (const FoundEffect& effect : calibration.diagnosis.effects)
+    count_estimated(effect.parameters);
+  for (const UnlistedStructure& each : calibration.diagnosis.unlisted)
+    count_estimated(each.parameters);
+  // The twelve once more under the true noise, which the search did not know.
+  const Eigen::MatrixXd twelve = whitening.apply(twelve_columns(set, log));
+  const Eigen::VectorXd left =
+      whitening.apply(stacked_V(observed) - predict_stacked_V(log, found.parameters));
+  return criterion((left - twelve * solve_least_squares(twelve, left).x).squaredNorm(),
+                   mean_rows(log), parameters);
 }
 
 }  // namespace plumbline::study

@@ -269,9 +269,10 @@ SetOutcome score(const SetDesign& design, const StudySet& set, const Calibration
   check_parameters(set.effects, calibration.diagnosis, outcome);
   check_twelve(set, calibration, outcome);
   score_oracle(set, outcome);
-  outcome.told_fresh = told_fresh_mps2(design, set);
-
   const CertifiedModel model = certified_model(calibration);
+  const Told told = told_effects(design, set);
+  outcome.told_fresh = told.fresh_mps2;
+  outcome.truth_ahead = criterion_of(set, calibration) - told.criterion;
   outcome.before.heldout = over_axes(calibration.before.heldout_pose_rms_mps2);
   outcome.after.heldout = over_axes(calibration.after.heldout_pose_rms_mps2);
   score_fresh(set, model, outcome);

@@ -191,6 +191,7 @@ TEST(DiagnosisStudyItself, RowsAreReadBackAsTheyWereWritten) {
   outcome.effects = 2;
   outcome.named = 1;
   outcome.after.fresh = 0.0215;
+  outcome.truth_ahead = -3.5;
   outcome.naive.wrong = 3;
   const std::string text = csv_header() + csv_row(outcome);
   const auto rows = read_csv(text + "8,rig.back", "rows");  // the last one was cut short

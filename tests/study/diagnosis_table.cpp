@@ -86,14 +86,18 @@ struct Score {
 constexpr double kWorse = 1.02;  // of the error before
 /// From one who is told the effect, where it is on the list and where it is not.
 constexpr double kFar = 1.15, kFarOutside = 1.5;
+/// What the readings of a run must favour the truth by to tell it from what was found: odds of 150
+/// to 1 (Kass & Raftery, 1995: "very strong").
+constexpr double kTold = 10;
 
 /// All that a group of sets shows.
 struct Tally {
   Score ours, naive;
   Share coverage, K, U0, unexplained, worse;
   /// Of one who is told the effect: error above 1.02 of that before; and how often ours is far from
-  /// that, then too weak an effect or one that other names explain as well.
-  Share told_worse, far_from_told, far_and_weak, far_and_stated;
+  /// that, then too weak an effect, one that other names explain as well, or one that the readings
+  /// of the run do not favour over what was found.
+  Share told_worse, far_from_told, far_and_weak, far_and_stated, far_and_open;
   std::vector<double> heldout, evaluated, told, after_told, seconds;
   std::map<std::string, int> claims;  ///< how often what was reported, for effects outside the list
   int sets = 0, infeasible = 0, undetectable = 0;
@@ -124,6 +128,7 @@ struct Tally {
       if (is_far) {
         count(far_and_weak, is_weak);
         count(far_and_stated, !is_weak && o.named < o.effects && o.named_or_stated == o.effects);
+        count(far_and_open, o.truth_ahead < kTold);
       }
     }
     coverage.k += o.parameters_within;
@@ -244,6 +249,7 @@ std::string totals(const Tally& all, double detectable_sigma) {
        all.far_from_told);
   line("  of these an effect of less than the sigma above", all.far_and_weak);
   line("  of these right among the stated alternatives", all.far_and_stated);
+  line(fmt::format("  of these the readings favour the truth by < {}", kTold), all.far_and_open);
   text += fmt::format("calibrate(): median {:.2f} s, longest {:.2f} s\n",
                       quantile(all.seconds, 0.5), quantile(all.seconds, 1));
   return text;

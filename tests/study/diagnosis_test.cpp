@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/study/diagnosis_expectations.h"
 
 namespace plumbline::study {
@@ -169,6 +171,28 @@ TEST(DiagnosisStudy, WhoIsToldTheEffectErrsAsMuch) {
   expect_only_finding(outcome);
   EXPECT_GT(outcome.told_fresh, 1.5 * outcome.oracle.fresh);
   EXPECT_LT(outcome.after.fresh, 1.05 * outcome.told_fresh);
+}
+
+// What the error after is judged by where it is far from that of one who is told: whether the
+// readings of the run could have shown it. A pose at a wrong angle is in the model of its run
+// alone.
+TEST(DiagnosisStudy, ReadingsFavourWhatIsTrueOverNothing) {
+  const SetDesign design{.seed = 4,
+                         .effects = {"sensor.quadratic", "rig.pose_outlier"},
+                         .size = 3,
+                         .samples_per_pose = 10,
+                         .static_s = 60};
+  const StudySet set = make_set(design);
+  Calibration calibration =
+      calibrate({set.set.run, &set.static_record, set.set.description}, {design.seed});
+  const SetOutcome found = score(design, set, calibration);
+  ASSERT_EQ(found.named, 2) << found.found;
+  EXPECT_NEAR(found.truth_ahead, 0, 10);
+
+  const double gain = std::pow(set.sigma[0], 2) + std::pow(set.sigma[1], 2);
+  calibration.diagnosis.effects.clear();
+  calibration.final = calibration.estimates;
+  EXPECT_NEAR(score(design, set, calibration).truth_ahead, gain, 0.2 * gain);
 }
 
 }  // namespace
