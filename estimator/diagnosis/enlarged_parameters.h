@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "estimator/effects/effect.h"
@@ -9,12 +11,18 @@
 
 namespace plumbline {
 
+/// A structure that has no name, of which something that has one is a part.
+struct StructurePart {
+  std::string driver, form;  ///< of the structure
+};
+
 /// An effect that takes part in the model.
 struct ActiveEffect {
   const Effect* effect = nullptr;
-  std::size_t axis = 0;    ///< of a sensor effect
-  std::vector<double> p;   ///< values, in the order of effect->parameters()
-  std::vector<bool> free;  ///< which of them are estimated
+  std::size_t axis = 0;                       ///< of a sensor effect
+  std::vector<double> p;                      ///< values, in the order of effect->parameters()
+  std::vector<bool> free;                     ///< which of them are estimated
+  std::optional<StructurePart> part_of = {};  ///< so it is reported, not by its name
 
   Eigen::Index free_count() const;
 };

@@ -9,6 +9,7 @@
 #include "estimator/diagnosis/findings.h"
 #include "estimator/diagnosis/fitted_terms.h"
 #include "estimator/diagnosis/noise_stage.h"
+#include "estimator/diagnosis/structure_parts.h"
 #include "estimator/diagnosis/validated_search.h"
 #include "estimator/diagnosis/verdict.h"
 #include "estimator/diagnosis/wander.h"
@@ -340,6 +341,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   const SearchInput estimated_search{estimated_log,   observed, input.noise,  input.processes,
                                      search.known_V2, start,    &input.pooled};
   std::optional<CodeEstimate>& codes = searched.codes;
+  if (!codes) mark_parts_of_structures(log, found);
   if (!codes) codes = estimate_from_codes(search, input.input.run, found);
 
   const EnlargedEstimate by_means = found.fit;
@@ -360,7 +362,7 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   explained.estimate.covariance = if_true.covariance.topLeftCorner<kTwelve, kTwelve>();
   explained.estimate.alternatives = among.topLeftCorner<kTwelve, kTwelve>();
   Diagnosis diagnosis = describe_findings(search, searched.candidates, found, rivals);
-  attach_gains(found.evidence, searched.gains, diagnosis);
+  attach_gains(found, searched.gains, diagnosis);
   if (std::any_of(found.fit.parameters.effects.begin(), found.fit.parameters.effects.end(),
                   [](const ActiveEffect& active) { return active.effect->remembers(); }))
     diagnosis.history = history_of(log);

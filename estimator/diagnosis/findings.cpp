@@ -7,7 +7,7 @@
 
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/separating_design.h"
-#include "estimator/effects/smooth_term.h"
+#include "estimator/diagnosis/structure_parts.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -62,12 +62,13 @@ std::vector<EffectParameter> report_parameters(const VisitLog& log,
   return reported;
 }
 
+void add_name(const std::string& name, Ambiguity& entry) {
+  auto& names = entry.alternatives;
+  if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+}
+
 void add_rivals(const Rivals& rivals, Ambiguity& entry) {
-  for (const Alternative& rival : rivals.alternatives) {
-    auto& names = entry.alternatives;
-    if (std::find(names.begin(), names.end(), rival.name) == names.end())
-      names.push_back(rival.name);
-  }
+  for (const Alternative& rival : rivals.alternatives) add_name(rival.name, entry);
   const Separation& separation = rivals.separation;
   if (separation.words.empty() || entry.separate_by == separation.words) return;
   entry.separate_by += (entry.separate_by.empty() ? "" : "; ") + separation.words;
@@ -122,33 +123,27 @@ struct Place {
 
 /// Of each effect of a model, in its order. A column that changes the bias of one axis and the
 /// scale of another is two effects under one id.
-std::vector<Place> places_of(const std::vector<const Effect*>& effects) {
+std::vector<Place> places_of(const EnlargedParameters& model) {
+  const std::vector<ActiveEffect>& effects = model.effects;
   std::vector<Place> places;
   std::size_t listed = 0, unlisted = 0;
-  for (const Effect* effect : effects) {
-    if (dynamic_cast<const SmoothTerm*>(effect) != nullptr) {
-      places.push_back({true, unlisted++});
-      continue;
-    }
-    const auto same = std::find(effects.begin(), effects.end(), effect) - effects.begin();
-    const bool joins = shares_an_entry(*effect) && same < std::ssize(places);
-    places.push_back(joins ? places[static_cast<std::size_t>(same)] : Place{false, listed++});
+  for (const ActiveEffect& active : effects) {
+    const bool is_unlisted = structure_name(active).has_value();
+    const bool has_listed_shape = !is_unlisted || active.part_of;
+    const auto same = std::find_if(effects.begin(), effects.end(),
+                                   [&](const ActiveEffect& other) {
+                                     return other.effect == active.effect &&
+                                            other.part_of.has_value() == active.part_of.has_value();
+                                   }) -
+                      effects.begin();
+    const bool joins =
+        has_listed_shape && shares_an_entry(*active.effect) && same < std::ssize(places);
+    if (joins)
+      places.push_back(places[static_cast<std::size_t>(same)]);
+    else
+      places.push_back({is_unlisted, is_unlisted ? unlisted++ : listed++});
   }
   return places;
-}
-
-std::vector<Place> places_of(const EnlargedParameters& model) {
-  std::vector<const Effect*> effects;
-  effects.reserve(model.effects.size());
-  for (const ActiveEffect& active : model.effects) effects.push_back(active.effect);
-  return places_of(effects);
-}
-
-std::vector<Place> places_of(const std::vector<Evidence>& evidence) {
-  std::vector<const Effect*> effects;
-  effects.reserve(evidence.size());
-  for (const Evidence& found : evidence) effects.push_back(found.candidate.effect);
-  return places_of(effects);
 }
 
 /// One entry per place.
@@ -157,22 +152,32 @@ struct Reported {
   std::vector<UnlistedStructure> unlisted;
 };
 
+/// The axes of an effect, and its parameters, to the entry that it has or shares.
+template <typename Entry>
+void add_to(Entry& entry, const ActiveEffect& active, std::vector<EffectParameter> parameters) {
+  for (const std::size_t axis : axes_of(active))
+    if (std::find(entry.axes.begin(), entry.axes.end(), axis) == entry.axes.end())
+      entry.axes.push_back(axis);
+  std::sort(entry.axes.begin(), entry.axes.end());
+  std::move(parameters.begin(), parameters.end(), std::back_inserter(entry.parameters));
+}
+
 Reported report(const VisitLog& log, const EnlargedEstimate& estimate) {
   Reported reported;
   const std::vector<Place> places = places_of(estimate.parameters);
   for (std::size_t e = 0; e < places.size(); ++e) {
     const ActiveEffect& active = estimate.parameters.effects[e];
     std::vector<EffectParameter> parameters = report_parameters(log, estimate, e);
-    if (places[e].unlisted) {
-      const auto* term = dynamic_cast<const SmoothTerm*>(active.effect);
-      reported.unlisted.push_back({{},
-                                   term->driver(),
-                                   to_string(term->form()),
-                                   axes_of(active),
-                                   term->shape(),
-                                   std::move(parameters),
-                                   1,
-                                   0});
+    if (const auto name = structure_name(active)) {
+      if (places[e].index == reported.unlisted.size()) {
+        UnlistedStructure fresh;
+        fresh.driver = name->driver;
+        fresh.form = name->form;
+        fresh.shape = name->shape;
+        fresh.p_value = 0;
+        reported.unlisted.push_back(std::move(fresh));
+      }
+      add_to(reported.unlisted[places[e].index], active, std::move(parameters));
       continue;
     }
     if (places[e].index == reported.effects.size()) {
@@ -182,14 +187,7 @@ Reported report(const VisitLog& log, const EnlargedEstimate& estimate) {
       fresh.definition = active.effect->definition();
       reported.effects.push_back(std::move(fresh));
     }
-    FoundEffect& entry = reported.effects[places[e].index];
-    for (std::size_t axis : axes_of(active)) {
-      if (std::find(entry.axes.begin(), entry.axes.end(), axis) == entry.axes.end()) {
-        entry.axes.push_back(axis);
-      }
-    }
-    std::sort(entry.axes.begin(), entry.axes.end());
-    for (EffectParameter& p : parameters) entry.parameters.push_back(std::move(p));
+    add_to(reported.effects[places[e].index], active, std::move(parameters));
   }
   return reported;
 }
@@ -240,17 +238,19 @@ Diagnosis describe_findings(const SearchInput& input, const CandidateList& list,
   Diagnosis diagnosis;
   auto [effects, unlisted] = report(input.log, search.fit);
   diagnosis.not_found = detection_limits(input, list, search);
-  const std::vector<Place> places = places_of(search.evidence);
+  const std::vector<ActiveEffect>& model = search.fit.parameters.effects;
+  const std::vector<Place> places = places_of(search.fit.parameters);
   for (std::size_t e = 0; e < places.size(); ++e) {
-    const double p_value = search.evidence[e].p_value;
-    if (places[e].unlisted) {
-      unlisted[places[e].index].p_value = p_value;
-      add_rivals(rivals[e], unlisted[places[e].index]);
-      continue;
-    }
-    FoundEffect& entry = effects[places[e].index];
-    entry.p_value = std::max(entry.p_value, p_value);
-    add_rivals(rivals[e], entry);
+    const auto complete = [&](auto& entry) {
+      entry.p_value = std::max(entry.p_value, search.evidence[e].p_value);
+      // It may be what its name says after all.
+      if (model[e].part_of) add_name(model[e].effect->id(), entry);
+      add_rivals(rivals[e], entry);
+    };
+    if (places[e].unlisted)
+      complete(unlisted[places[e].index]);
+    else
+      complete(effects[places[e].index]);
   }
   diagnosis.effects = std::move(effects);
   diagnosis.unlisted = std::move(unlisted);
@@ -332,13 +332,13 @@ void add_noise(const std::vector<NoiseDriver>& follows, const EnlargedParameters
   }
 }
 
-void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
+void attach_gains(const SearchResult& found, const std::vector<double>& gains,
                   Diagnosis& diagnosis) {
-  const std::vector<Place> places = places_of(evidence);
+  const std::vector<Place> places = places_of(found.fit.parameters);
   for (std::size_t e = 0; e < places.size() && e < gains.size(); ++e) {
     const auto attach = [&](auto& entry) {
       entry.heldout_gain = std::max(entry.heldout_gain, gains[e]);
-      entry.sigmas = std::max(entry.sigmas, evidence[e].sigmas);
+      entry.sigmas = std::max(entry.sigmas, found.evidence[e].sigmas);
     };
     if (places[e].unlisted)
       attach(diagnosis.unlisted[places[e].index]);

@@ -37,7 +37,7 @@ void attach_filter(const VisitLog& log, const EnlargedEstimate& batch,
 
 /// Adds what speaks for each effect: the shares of the held-out excess that they remove, one for
 /// each evidence, and the losses of fit without them.
-void attach_gains(const std::vector<Evidence>& evidence, const std::vector<double>& gains,
+void attach_gains(const SearchResult& found, const std::vector<double>& gains,
                   Diagnosis& diagnosis);
 
 /// Adds what the noise follows, but for noise within the dwells on axes where something in the

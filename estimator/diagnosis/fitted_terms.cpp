@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "estimator/angle_units.h"
+#include "estimator/diagnosis/structure_parts.h"
 #include "estimator/effects/driver.h"
 #include "estimator/effects/smooth_term.h"
 
@@ -85,7 +86,8 @@ std::vector<FittedTerm> fitted_terms(const VisitLog& log, const EnlargedParamete
       best = driver;
     }
     if (best == nullptr) continue;
-    term.name = smooth == nullptr ? effect.id() : smooth->driver() + ": " + smooth->shape();
+    const auto structure = structure_name(model.effects[e]);
+    term.name = structure ? structure->driver + ": " + structure->shape : effect.id();
     term.driver = best->past.empty() ? best->name : best->past;
     term.at = best->value[term.axis];
     if (best->unit() == "rad")

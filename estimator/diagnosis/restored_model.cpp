@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimator/diagnosis/structure_parts.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"
 #include "estimator/effects/driver.h"
@@ -32,8 +33,11 @@ std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
   }
   std::vector<ActiveEffect> found;
   for (const auto& value : values) {
-    ActiveEffect active{&effect, axis, std::vector<double>(infos.size()),
-                        std::vector<bool>(infos.size(), false)};
+    ActiveEffect active{&effect,
+                        axis,
+                        std::vector<double>(infos.size()),
+                        std::vector<bool>(infos.size(), false),
+                        {}};
     bool whole = true;
     for (std::size_t k = 0; k < infos.size(); ++k) {
       active.p[k] = value[k].value_or(0);
@@ -82,27 +86,35 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log, Re
   std::vector<const Effect*> named = effect_catalogue();
   for (const auto& effect : model.own_effects) named.push_back(effect.get());
   for (auto& effect : covariate_effects(log)) restored.owned.push_back(std::move(effect));
-  for (const FoundEffect& found : model.effects) {
+  const std::vector<std::shared_ptr<const Effect>> columns = restored.owned;
+  /// Whether anything is there by that id.
+  const auto restore_named = [&](const std::string& id, const std::vector<std::size_t>& axes,
+                                 const std::vector<EffectParameter>& reported) {
     const std::size_t before = parameters.effects.size();
     for (const Effect* effect : named)
-      if (effect->id() == found.id && (effect->carries_over() || use == RestoredFor::its_run) &&
+      if (effect->id() == id && (effect->carries_over() || use == RestoredFor::its_run) &&
           has_columns(effect->columns(), log, restored))
-        restore(*effect, found.axes, found.parameters, parameters);
-    for (const auto& effect : restored.owned) {
-      // Bias and scale form of a column share the id; the unit of c tells them apart.
-      if (effect->id() == found.id && !found.parameters.empty() &&
-          effect->parameters().front().unit == found.parameters.front().unit) {
-        restore(*effect, found.axes, found.parameters, parameters);
-      }
-    }
-    if (parameters.effects.size() > before) continue;
-    restored.left_out.push_back(found.id);
-    if (const auto column = covariate_column(found.id)) has_columns({*column}, log, restored);
-  }
+        restore(*effect, axes, reported, parameters);
+    // Bias and scale form of a column share the id; the unit of c tells them apart.
+    for (const auto& effect : columns)
+      if (effect->id() == id && !reported.empty() &&
+          effect->parameters().front().unit == reported.front().unit)
+        restore(*effect, axes, reported, parameters);
+    if (parameters.effects.size() > before) return true;
+    if (const auto column = covariate_column(id)) has_columns({*column}, log, restored);
+    return false;
+  };
+  for (const FoundEffect& found : model.effects)
+    if (!restore_named(found.id, found.axes, found.parameters))
+      restored.left_out.push_back(found.id);
   std::vector<std::unique_ptr<SmoothTerm>> terms;
   if (!model.unlisted.empty()) terms = smooth_terms(log, SmoothTermSelection::any);
   for (const UnlistedStructure& found : model.unlisted) {
     if (found.is_of_noise()) continue;  // it is in no mean
+    if (const auto id = part_like(found.shape)) {
+      if (!restore_named(*id, found.axes, found.parameters)) restored.left_out.push_back(*id);
+      continue;
+    }
     const std::size_t before = parameters.effects.size();
     const SmoothTerm* term = find_term(terms, found.driver, found.form, found.shape);
     if (has_columns(columns_behind(found.driver, model.history), log, restored) && term != nullptr)

@@ -6,11 +6,13 @@
 #include <numbers>
 #include <utility>
 
+#include "estimator/diagnosis/structure_parts.h"
 #include "tests/estimator/structure.h"
 
 namespace plumbline {
 namespace {
 
+using testing::IsEmpty;
 using testing::SizeIs;
 
 constexpr double kRadians = std::numbers::pi / 180;
@@ -216,9 +218,15 @@ TEST(Structure, ADriveThatLagsGoesByItsLastTurn) {
     return 0.003 * turn_deg;
   };
   const Calibration result = calibrated(synthetic_run(7, kSixteenBits, options));
-  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(1)) << result.diagnosis.reason;
+  EXPECT_THAT(result.diagnosis.effects, IsEmpty()) << result.diagnosis.reason;
+  ASSERT_THAT(result.diagnosis.unlisted, SizeIs(2)) << result.diagnosis.reason;
   EXPECT_EQ(result.diagnosis.unlisted[0].shape,
             "polynomial of degree 1 in the turn of delta within 360 degrees since, added to delta");
+  // To one pose the head came without turning: what the turn before did stays, and that pose is not
+  // at fault by itself.
+  const UnlistedStructure& part = result.diagnosis.unlisted[1];
+  EXPECT_EQ(part_like(part.shape), "rig.pose_outlier");
+  EXPECT_EQ(part.driver, "previous_pose");
 }
 
 // As a roll, a harmonic and a series.

@@ -1,0 +1,162 @@
+#include "estimator/diagnosis/structure_parts.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "estimator/diagnosis/enlarged_fit.h"
+#include "estimator/effects/covariate.h"
+#include "estimator/effects/driver.h"
+#include "estimator/effects/smooth_term.h"
+#include "estimator/linear_algebra.h"
+
+namespace plumbline {
+
+namespace {
+
+/// What the listed effects are functions of. Those that are constants of the head or of the
+/// converter are functions of nothing that a structure could follow as well.
+struct Listed {
+  std::string_view id;
+  TermForm form;
+  std::vector<std::string_view> drivers;  ///< "a", "code": those of the own axis
+};
+
+const std::vector<Listed>& listed_drivers() {
+  static const std::vector<Listed> all = {
+      {"adc.code_step", TermForm::bias, {"a", "code"}},
+      {"rig.backlash", TermForm::geometry, {"previous_pose"}},
+      {"rig.delta_eccentricity", TermForm::geometry, {"delta_deg"}},
+      {"rig.delta_ellipticity", TermForm::geometry, {"delta_deg"}},
+      {"rig.delta_periodic", TermForm::geometry, {"delta_deg"}},
+      {"rig.h_eccentricity", TermForm::geometry, {"h_deg"}},
+      {"rig.h_scale", TermForm::geometry, {"h_deg"}},
+      {"rig.index_slip", TermForm::geometry, {"t_s"}},
+      {"rig.tilt_index", TermForm::geometry, {"h_deg"}},
+      {"sensor.asymmetry", TermForm::bias, {"a", "code"}},
+      {"sensor.bias_step", TermForm::bias, {"t_s"}},
+      {"sensor.cubic", TermForm::bias, {"a", "code"}},
+      {"sensor.dead_zone", TermForm::bias, {"a", "code"}},
+      {"sensor.drift", TermForm::bias, {"t_s"}},
+      {"sensor.hysteresis", TermForm::bias, {"previous_pose", "a"}},
+      {"sensor.quadratic", TermForm::bias, {"a", "code"}},
+      {"sensor.saturation", TermForm::bias, {"a", "code"}},
+      {"sensor.scale_drift", TermForm::scale, {"t_s"}},
+      {"sensor.settling", TermForm::sample, {"t_in_pose"}},
+      {"sensor.temperature_bias", TermForm::bias, {kTemperatureColumn}},
+      {"sensor.temperature_scale", TermForm::scale, {kTemperatureColumn}},
+      {"sensor.warmup", TermForm::bias, {"t_s"}},
+  };
+  return all;
+}
+
+/// Form and drivers of a listed effect on an axis; nothing if it has none of these.
+struct Driven {
+  TermForm form;
+  std::vector<std::string> drivers;
+};
+std::optional<Driven> driven(const ActiveEffect& named) {
+  const Effect& effect = *named.effect;
+  if (const auto column = covariate_column(effect.id())) {
+    const bool bias = effect.parameters().front().unit.starts_with("g");
+    return Driven{bias ? TermForm::bias : TermForm::scale, {*column}};
+  }
+  for (const Listed& listed : listed_drivers()) {
+    if (listed.id != effect.id()) continue;
+    Driven found{listed.form, {}};
+    for (const std::string_view driver : listed.drivers) {
+      const bool of_axis = driver == "a" || driver == "code";
+      found.drivers.push_back(std::string(driver) +
+                              (of_axis ? std::string("_") + kAxisName[named.axis] : ""));
+    }
+    return found;
+  }
+  return {};
+}
+
+const SmoothTerm* term_of(const ActiveEffect& active) {
+  return dynamic_cast<const SmoothTerm*>(active.effect);
+}
+
+bool act_on_the_same(const ActiveEffect& one, const ActiveEffect& other) {
+  return one.effect->subject() == other.effect->subject() &&
+         (one.effect->subject() == Subject::head || one.axis == other.axis);
+}
+
+/// The driver that both follow in the same form.
+std::optional<std::string> common_driver(const ActiveEffect& named, const ActiveEffect& unnamed) {
+  const auto of_named = driven(named);
+  if (!of_named || !act_on_the_same(named, unnamed)) return {};
+  const SmoothTerm& term = *term_of(unnamed);
+  const std::string column = recorded_column(term.driver());
+  for (const std::string& driver : of_named->drivers) {
+    if (driver != column) continue;
+    // A scale that follows what it is the scale of is a function of that.
+    const bool of_output = driver.starts_with("a_") || driver.starts_with("code_");
+    if (term.form() == of_named->form || (of_output && term.form() == TermForm::scale))
+      return driver;
+  }
+  return {};
+}
+
+/// How far an effect moves the whitened readings at each visit, beside the 12 parameters.
+Eigen::VectorXd moved_at_visits(const EnlargedFit& fit, Eigen::Index n,
+                                const Eigen::MatrixXd& twelve, std::size_t effect) {
+  const Eigen::VectorXd all = whitened_contribution(fit, effect);
+  const Eigen::VectorXd own = all - twelve * (twelve.transpose() * all);
+  Eigen::VectorXd square = Eigen::VectorXd::Zero(n);
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    square += own.segment(static_cast<Eigen::Index>(axis) * n, n).cwiseAbs2();
+  return square.cwiseSqrt();
+}
+
+constexpr std::string_view kPartLike = "part that runs like ";
+
+}  // namespace
+
+std::optional<StructureName> structure_name(const ActiveEffect& active) {
+  if (active.part_of)
+    return StructureName{active.part_of->driver, active.part_of->form,
+                         std::string(kPartLike) + active.effect->id()};
+  const SmoothTerm* term = term_of(active);
+  if (term == nullptr) return {};
+  return StructureName{term->driver(), to_string(term->form()), term->shape()};
+}
+
+std::optional<std::string> part_like(const std::string& shape) {
+  if (!shape.starts_with(kPartLike)) return {};
+  return shape.substr(kPartLike.size());
+}
+
+void mark_parts_of_structures(const VisitLog& log, SearchResult& found) {
+  constexpr double kRemnant = 0.2;  // of what it takes to see the name
+  constexpr double kAsFar = 3;
+  std::vector<ActiveEffect>& effects = found.fit.parameters.effects;
+  const Eigen::Index n = std::ssize(log.visits);
+  std::optional<Eigen::MatrixXd> twelve;  // most models have no structures
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    ActiveEffect& named = effects[k];
+    if (term_of(named) != nullptr) continue;
+    double most_sigmas = 0;
+    for (std::size_t u = 0; u < effects.size(); ++u) {
+      const SmoothTerm* term = term_of(effects[u]);
+      if (term == nullptr || found.evidence[u].sigmas <= most_sigmas) continue;
+      std::optional<std::string> driver = common_driver(named, effects[u]);
+      bool is_part = driver && found.evidence[u].sigmas > kRemnant * found.evidence[k].sigmas;
+      if (named.effect->concerns_one_visit() && act_on_the_same(named, effects[u])) {
+        if (!twelve)
+          twelve = orthonormal_basis(found.fit.whitened_jacobian.leftCols(4 * kAxisCount));
+        is_part = moved_at_visits(found.fit, n, *twelve, k).maxCoeff() <
+                  kAsFar * moved_at_visits(found.fit, n, *twelve, u).maxCoeff();
+        driver = term->driver();
+      }
+      if (!is_part) continue;
+      most_sigmas = found.evidence[u].sigmas;
+      named.part_of = StructurePart{*driver, to_string(term->form())};
+    }
+  }
+}
+
+}  // namespace plumbline
