@@ -8,6 +8,7 @@
 #include "estimator/diagnosis/detection_limits.h"
 #include "estimator/diagnosis/separating_design.h"
 #include "estimator/diagnosis/structure_parts.h"
+#include "estimator/effects/smooth_term.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {

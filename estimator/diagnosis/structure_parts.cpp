@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/structure_parts.h"
 
 #include <algorithm>
+#include <cassert>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -58,6 +59,7 @@ struct Driven {
   std::vector<std::string> drivers;
 };
 std::optional<Driven> driven(const ActiveEffect& named) {
+  assert(named.effect != nullptr);
   const Effect& effect = *named.effect;
   if (const auto column = covariate_column(effect.id())) {
     const bool bias = effect.parameters().front().unit.starts_with("g");
