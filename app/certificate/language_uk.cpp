@@ -521,6 +521,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"power beyond a value", "степенева функція за певним значенням"},
     {"gain beyond a value", "інше підсилення за певним значенням"},
     {"thrown from side to side", "перекидання з боку на бік"},
+    {"two levels, from one to the other {} times", "два рівні, перехід між ними {} разів"},
     {"part that runs like {}", "частина, що поводиться як {}"},
     {"polynomial of degree {}", "многочлен степеня {}"},
     {"harmonic series of order {}", "гармонічний ряд порядку {}"},

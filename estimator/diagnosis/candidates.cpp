@@ -45,18 +45,18 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
   }
 }
 
-namespace {
-
-/// What an axis does from code to code has a name where the codes prove it, and what of that is
-/// left over repeats itself with what is measured, too.
-bool imitates_proven_rounding(const VisitLog& log, const SmoothTerm& term) {
-  const bool repeats = is_wave(term) || is_saw_tooth(term);
+bool imitates_proven_rounding(const VisitLog& log, const Effect& effect) {
+  const auto* term = dynamic_cast<const SmoothTerm*>(&effect);
+  if (term == nullptr) return false;
+  const bool repeats = is_wave(effect) || is_saw_tooth(effect);
   for (std::size_t i = 0; i < kAxisCount; ++i)
-    if (term.driver() == std::string("code_") + kAxisName[i] ||
-        (repeats && term.driver() == std::string("a_") + kAxisName[i]))
+    if (term->driver() == std::string("code_") + kAxisName[i] ||
+        (repeats && term->driver() == std::string("a_") + kAxisName[i]))
       return log.codes[i].any();
   return false;
 }
+
+namespace {
 
 /// Once per amplitude; an effect of shapes and indices alone once as it stands.
 std::vector<SingleAmplitude> single_amplitudes(const Candidate& candidate) {
@@ -100,8 +100,9 @@ CandidateList all_candidates(const VisitLog& log,
   }
   for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
     if (imitates_proven_rounding(log, *term)) continue;
+    const double handicap = kHandicapOfUnnamed + term->log_choices();
     list.owned.push_back(std::move(term));
-    add_candidates(list, log, *list.owned.back(), kHandicapOfUnnamed);
+    add_candidates(list, log, *list.owned.back(), handicap);
   }
   for (const auto& effect : own) {
     list.owned.push_back(effect);

@@ -61,6 +61,10 @@ double looks_on_axes(const CandidateList& list, const Candidate& candidate);
 void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
                     double handicap = 0);
 
+/// Whether what an axis does from code to code, which has a name where the codes of this log prove
+/// it, leaves over what looks like this: it repeats itself with what is measured, too.
+bool imitates_proven_rounding(const VisitLog& log, const Effect& effect);
+
 /// The catalogue, every recorded column, smooth terms in every variable, and the user's `own`
 /// effects.
 CandidateList all_candidates(const VisitLog& log,

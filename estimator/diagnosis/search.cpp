@@ -15,6 +15,7 @@
 #include "estimator/diagnosis/screening.h"
 #include "estimator/diagnosis/search_model.h"
 #include "estimator/diagnosis/slow_look.h"
+#include "estimator/diagnosis/switching.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {
@@ -154,6 +155,7 @@ class Search {
       if (found) exchange_slow(model_, model_.size() - 1);
       model_.drop_superfluous();
       tell_in_one(model_);
+      tell_by_switching(model_);
       if (!found) worth_slow_look = model_.size() > before;
     }
     return true;

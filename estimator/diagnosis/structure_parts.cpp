@@ -114,6 +114,28 @@ Eigen::VectorXd moved_at_visits(const EnlargedFit& fit, Eigen::Index n,
   return square.cwiseSqrt();
 }
 
+/// What happens at one time and stays, where there are three of one axis (or the head) or more that
+/// go to and fro: something switches.
+void mark_what_switches(std::vector<ActiveEffect>& effects) {
+  constexpr std::size_t kSeveral = 3;
+  for (ActiveEffect& first : effects) {
+    const std::string id = first.effect->id();
+    if (first.part_of || (id != "sensor.bias_step" && id != "rig.index_slip")) continue;
+    std::vector<ActiveEffect*> all;
+    double least = 0, most = 0;
+    for (ActiveEffect& other : effects) {
+      if (other.effect != first.effect || !act_on_the_same(first, other)) continue;
+      all.push_back(&other);
+      least = std::min(least, other.p[0]);
+      most = std::max(most, other.p[0]);
+    }
+    if (all.size() < kSeveral || !(least < 0 && most > 0)) continue;
+    const Driven of_time = *driven(first);
+    for (ActiveEffect* each : all)
+      each->part_of = StructurePart{of_time.drivers.front(), to_string(of_time.form)};
+  }
+}
+
 constexpr std::string_view kPartLike = "part that runs like ";
 
 }  // namespace
@@ -159,6 +181,7 @@ void mark_parts_of_structures(const VisitLog& log, SearchResult& found) {
       named.part_of = StructurePart{*driver, to_string(term->form())};
     }
   }
+  mark_what_switches(effects);
 }
 
 }  // namespace plumbline

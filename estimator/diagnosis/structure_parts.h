@@ -12,7 +12,9 @@ namespace plumbline {
 /// sooner one structure, of which the listed shape is a part, than two causes that happen to share
 /// all three. Such names become parts (ActiveEffect::part_of), unless the structure is but a small
 /// remnant of what the name stands for. A pose at a wrong angle is one as well where structures
-/// move the head about as far: there the structure may be another than its function says.
+/// move the head about as far: there the structure may be another than its function says. Three
+/// steps of an axis, or slips of the index, that go to and fro are parts of something that
+/// switches.
 void mark_parts_of_structures(const VisitLog& log, SearchResult& found);
 
 /// What is reported of an effect that has no name or is a part of what has none; else nothing.

@@ -330,7 +330,8 @@ std::optional<SearchBesideBits> search_beside_stuck_bits(
     const Observations observed = observe(bits.run(), log);
     result.candidates = all_candidates(log, own);
     std::erase_if(result.candidates.candidates, [&](const Candidate& candidate) {
-      return candidate.effect == &stuck_bit && bits.on(candidate.axis);
+      return (candidate.effect == &stuck_bit && bits.on(candidate.axis)) ||
+             imitates_proven_rounding(input.log, *candidate.effect);
     });
     PerAxis<Eigen::VectorXd> known_V2 = input.known_V2;
     for (std::size_t axis = 0; axis < kAxisCount; ++axis)

@@ -13,6 +13,7 @@
 #include "estimator/effects/head_decay.h"
 #include "estimator/effects/memory_term.h"
 #include "estimator/effects/steady_line.h"
+#include "estimator/effects/telegraph.h"
 #include "estimator/effects/turn_about_axes.h"
 
 namespace plumbline {
@@ -213,6 +214,9 @@ class TermList {
     add_tilt(window(clock, kTilt));
     add_seat(step(clock, kSeat, StepEdge::sharp));
     add_seat(decay(clock, kSeat));
+    for (const Target& target : {kBias, kScale, kDelta, kH, kRoll})
+      for (int switches = Telegraph::kFewest; switches <= Telegraph::kMost; ++switches)
+        add(std::make_unique<Telegraph>(clock, target, switches));
     add(dying_wave(clock, kBias));
     add(pulses(clock, kBias));
     add(saw_tooth(clock, kBias));

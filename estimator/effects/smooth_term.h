@@ -25,6 +25,8 @@ class SmoothTerm : public Effect {
   virtual TermForm form() const = 0;
   /// "polynomial of degree 2" …; with driver and form it says which term this is.
   virtual std::string shape() const = 0;
+  /// ln of how many there are to choose among, where hypotheses() has one that stands for them.
+  virtual double log_choices() const { return 0; }
   bool is(const std::string& driver, const std::string& form, const std::string& shape) const;
 };
 

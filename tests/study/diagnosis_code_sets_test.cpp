@@ -163,6 +163,22 @@ TEST(DiagnosisSets, StepsOfTheCodesThatStoodForTheEdgesOfAStuckBitGo) {
   EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
 }
 
+// Once the bit was given back to the readings, nothing proved it any more, and what was left of its
+// edges had gone by a bit of the codes without a name.
+TEST(DiagnosisSets, WhatIsLeftOfAStuckBitIsNoFurtherBit) {
+  const SetOutcome outcome = run_set({.seed = 2050003,
+                                      .effects = {"adc.stuck_bit"},
+                                      .size = 3,
+                                      .order = sim::RecordOrder::raster,
+                                      .noise = NoiseKind::white,
+                                      .bits = 16,
+                                      .samples_per_pose = 50,
+                                      .static_s = 600});
+  expect_only_finding(outcome);
+  EXPECT_LT(outcome.truth_ahead, 10);
+  EXPECT_LT(outcome.after.fresh, 1.1 * outcome.told_fresh);
+}
+
 // A step of 1.49 declared ones leaves every third code out, as one of 1.5 does.
 TEST(DiagnosisSets, AStepOfOneAndAHalfIsOnlySoWellKnown) {
   const SetOutcome outcome = run_set({.seed = 1360006,
