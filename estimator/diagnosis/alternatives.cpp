@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/alternatives.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -132,7 +133,9 @@ struct Vacancy {
         without(fit_enlarged(input.log, search.observed, search.whitening, base)),
         found_gain(without.chi2 - search.fit.chi2),
         gains(search.responses, without),
-        ranked(best_of_families(list, gains, gains.of_residual())) {}
+        ranked(best_of_families(list, gains, gains.of_residual())) {
+    assert(result.responses.place.size() == list.candidates.size());
+  }
   Vacancy(const Vacancy&) = delete;  // the gains refer to the fit beside them
   Vacancy& operator=(const Vacancy&) = delete;
 

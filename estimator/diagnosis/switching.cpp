@@ -196,6 +196,13 @@ std::vector<double> times_of_switches(const VisitLog& log, const Trace& trace,
   return times_s;
 }
 
+/// Whether it follows where the head is or was: in an order of poses what follows that may come and
+/// go with the time.
+bool follows_poses(const Candidate& candidate) {
+  const auto* term = dynamic_cast<const SmoothTerm*>(candidate.effect);
+  return term != nullptr && term->driver() != "t_s" && term->columns().empty();
+}
+
 bool follows_time(const Candidate& candidate) {
   if (const auto* term = dynamic_cast<const SmoothTerm*>(candidate.effect))
     return term->driver() == "t_s";
@@ -205,7 +212,7 @@ bool follows_time(const Candidate& candidate) {
 }
 
 /// What such a candidate may take the place of: what follows the time on the same axis, or of the
-/// head, if these are several; all that there is.
+/// head, if these are several; all but what follows the poses.
 std::vector<std::vector<std::size_t>> replaceable(const SearchModel& model,
                                                   const Candidate& candidate) {
   constexpr std::size_t kSeveral = 3, kMany = 4;
@@ -215,7 +222,7 @@ std::vector<std::vector<std::size_t>> replaceable(const SearchModel& model,
     const Candidate& chosen = model.candidate(k);
     const bool same =
         chosen.effect->subject() == candidate.effect->subject() && chosen.axis == candidate.axis;
-    if (!same || model.is_certain(chosen)) continue;
+    if (!same || model.is_certain(chosen) || follows_poses(chosen)) continue;
     all.push_back(k);
     switches = switches || telegraph_of(chosen) != nullptr;
     if (follows_time(chosen)) of_time.push_back(k);

@@ -218,7 +218,7 @@ void search_past_what_fails(const SearchInput& search, const std::vector<PoseMea
     const std::vector<std::size_t> kept = families_of(result.found);
     std::set_difference(families.begin(), families.end(), kept.begin(), kept.end(),
                         std::back_inserter(failed));
-    if (failed.empty()) return;
+    if (failed.empty()) break;
     std::erase_if(open.candidates, [&](const Candidate& candidate) {
       return std::binary_search(failed.begin(), failed.end(), candidate.family);
     });
