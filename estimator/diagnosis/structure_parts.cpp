@@ -1,82 +1,20 @@
 #include "estimator/diagnosis/structure_parts.h"
 
 #include <algorithm>
-#include <cassert>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "estimator/diagnosis/enlarged_fit.h"
-#include "estimator/effects/covariate.h"
 #include "estimator/effects/driver.h"
+#include "estimator/effects/listed_drivers.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/linear_algebra.h"
 
 namespace plumbline {
 
 namespace {
-
-/// What the listed effects are functions of. Those that are constants of the head or of the
-/// converter are functions of nothing that a structure could follow as well.
-struct Listed {
-  std::string_view id;
-  TermForm form;
-  std::vector<std::string_view> drivers;  ///< "a", "code": those of the own axis
-};
-
-const std::vector<Listed>& listed_drivers() {
-  static const std::vector<Listed> all = {
-      {"adc.code_step", TermForm::bias, {"a", "code"}},
-      {"rig.backlash", TermForm::geometry, {"previous_pose"}},
-      {"rig.delta_eccentricity", TermForm::geometry, {"delta_deg"}},
-      {"rig.delta_ellipticity", TermForm::geometry, {"delta_deg"}},
-      {"rig.delta_periodic", TermForm::geometry, {"delta_deg"}},
-      {"rig.h_eccentricity", TermForm::geometry, {"h_deg"}},
-      {"rig.h_scale", TermForm::geometry, {"h_deg"}},
-      {"rig.index_slip", TermForm::geometry, {"t_s"}},
-      {"rig.tilt_index", TermForm::geometry, {"h_deg"}},
-      {"sensor.asymmetry", TermForm::bias, {"a", "code"}},
-      {"sensor.bias_step", TermForm::bias, {"t_s"}},
-      {"sensor.cubic", TermForm::bias, {"a", "code"}},
-      {"sensor.dead_zone", TermForm::bias, {"a", "code"}},
-      {"sensor.drift", TermForm::bias, {"t_s"}},
-      {"sensor.hysteresis", TermForm::bias, {"previous_pose", "a"}},
-      {"sensor.quadratic", TermForm::bias, {"a", "code"}},
-      {"sensor.saturation", TermForm::bias, {"a", "code"}},
-      {"sensor.scale_drift", TermForm::scale, {"t_s"}},
-      {"sensor.settling", TermForm::sample, {"t_in_pose"}},
-      {"sensor.temperature_bias", TermForm::bias, {kTemperatureColumn}},
-      {"sensor.temperature_scale", TermForm::scale, {kTemperatureColumn}},
-      {"sensor.warmup", TermForm::bias, {"t_s"}},
-  };
-  return all;
-}
-
-/// Form and drivers of a listed effect on an axis; nothing if it has none of these.
-struct Driven {
-  TermForm form;
-  std::vector<std::string> drivers;
-};
-std::optional<Driven> driven(const ActiveEffect& named) {
-  assert(named.effect != nullptr);
-  const Effect& effect = *named.effect;
-  if (const auto column = covariate_column(effect.id())) {
-    const bool bias = effect.parameters().front().unit.starts_with("g");
-    return Driven{bias ? TermForm::bias : TermForm::scale, {*column}};
-  }
-  for (const Listed& listed : listed_drivers()) {
-    if (listed.id != effect.id()) continue;
-    Driven found{listed.form, {}};
-    for (const std::string_view driver : listed.drivers) {
-      const bool of_axis = driver == "a" || driver == "code";
-      found.drivers.push_back(std::string(driver) +
-                              (of_axis ? std::string("_") + kAxisName[named.axis] : ""));
-    }
-    return found;
-  }
-  return {};
-}
 
 const SmoothTerm* term_of(const ActiveEffect& active) {
   return dynamic_cast<const SmoothTerm*>(active.effect);
@@ -89,7 +27,7 @@ bool act_on_the_same(const ActiveEffect& one, const ActiveEffect& other) {
 
 /// The driver that both follow in the same form.
 std::optional<std::string> common_driver(const ActiveEffect& named, const ActiveEffect& unnamed) {
-  const auto of_named = driven(named);
+  const auto of_named = drivers_of(*named.effect, named.axis);
   if (!of_named || !act_on_the_same(named, unnamed)) return {};
   const SmoothTerm& term = *term_of(unnamed);
   const std::string column = recorded_column(term.driver());
@@ -130,7 +68,7 @@ void mark_what_switches(std::vector<ActiveEffect>& effects) {
       most = std::max(most, other.p[0]);
     }
     if (all.size() < kSeveral || !(least < 0 && most > 0)) continue;
-    const Driven of_time = *driven(first);
+    const ListedDrivers of_time = *drivers_of(*first.effect, first.axis);
     for (ActiveEffect* each : all)
       each->part_of = StructurePart{of_time.drivers.front(), to_string(of_time.form)};
   }

@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "estimator/diagnosis/exchange.h"
 #include "estimator/diagnosis/screening.h"
+#include "estimator/effects/listed_drivers.h"
 #include "estimator/effects/telegraph.h"
 #include "estimator/median.h"
 
@@ -206,9 +206,8 @@ bool follows_poses(const Candidate& candidate) {
 bool follows_time(const Candidate& candidate) {
   if (const auto* term = dynamic_cast<const SmoothTerm*>(candidate.effect))
     return term->driver() == "t_s";
-  const std::string id = candidate.effect->id();
-  return id == "sensor.bias_step" || id == "sensor.drift" || id == "sensor.scale_drift" ||
-         id == "sensor.warmup" || id == "rig.index_slip";
+  const auto listed = drivers_of(*candidate.effect, candidate.axis);
+  return listed && std::count(listed->drivers.begin(), listed->drivers.end(), "t_s") > 0;
 }
 
 /// What such a candidate may take the place of: what follows the time on the same axis, or of the

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 #include <utility>
@@ -294,7 +295,11 @@ class DyingWave final : public DrivenTerm {
 
 class Decay final : public DrivenTerm {
  public:
-  using DrivenTerm::DrivenTerm;
+  /// What hardly changes would stand for what is there all the time, where that has a name.
+  Decay(DriverPointer clock, const Target& target, double longest_s)
+      : DrivenTerm(std::move(clock), target),
+        longest_s_(target.mean_in_the_twelve() ? std::numeric_limits<double>::infinity()
+                                               : longest_s) {}
 
   std::vector<ParameterInfo> parameters() const override {
     return {{"tau", "s", ParameterRole::shape}, {"p", target().unit(), ParameterRole::amplitude}};
@@ -309,7 +314,11 @@ class Decay final : public DrivenTerm {
 
  private:
   std::string function() const override { return "exponential"; }
-  double at(double t_s, const double* p) const override { return p[1] * std::exp(-t_s / p[0]); }
+  double at(double t_s, const double* p) const override {
+    return p[0] <= longest_s_ ? p[1] * std::exp(-t_s / p[0]) : 0;
+  }
+
+  double longest_s_;
 };
 
 /// What diffuses grows with the root of the time; other powers come out of the fit.
@@ -476,8 +485,8 @@ bool is_wave(const Effect& effect) { return dynamic_cast<const Wave*>(&effect) !
 std::unique_ptr<SmoothTerm> dying_wave(DriverPointer clock, const Target& target) {
   return std::make_unique<DyingWave>(std::move(clock), target);
 }
-std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target) {
-  return std::make_unique<Decay>(std::move(clock), target);
+std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target, double longest_s) {
+  return std::make_unique<Decay>(std::move(clock), target, longest_s);
 }
 std::unique_ptr<SmoothTerm> power(DriverPointer driver, const Target& target) {
   return std::make_unique<Power>(std::move(driver), target);

@@ -130,8 +130,9 @@ std::unique_ptr<SmoothTerm> thrown(DriverPointer angle, const Target& target);
 std::unique_ptr<SmoothTerm> half_wave(DriverPointer angle, const Target& target);
 /// From nothing to all of it about an unknown value (logistic function).
 std::unique_ptr<SmoothTerm> step(DriverPointer driver, const Target& target, StepEdge edge);
-/// What dies away with the time, by an unknown time constant.
-std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target);
+/// What dies away with the time, by an unknown time constant; of a target whose mean the 12
+/// parameters do not hold, one no longer than `longest_s`.
+std::unique_ptr<SmoothTerm> decay(DriverPointer clock, const Target& target, double longest_s);
 /// An unknown power of the distance from where the driver began.
 std::unique_ptr<SmoothTerm> power(DriverPointer driver, const Target& target);
 /// ln(1 + distance from where the driver began over an unknown one).

@@ -213,7 +213,7 @@ class TermList {
       add(window(clock, {.form = TermForm::scale, .other = other}));
     add_tilt(window(clock, kTilt));
     add_seat(step(clock, kSeat, StepEdge::sharp));
-    add_seat(decay(clock, kSeat));
+    add_seat(decay(clock, kSeat, longest_s()));
     for (const Target& target : {kBias, kScale, kDelta, kH, kRoll})
       for (int switches = Telegraph::kFewest; switches <= Telegraph::kMost; ++switches)
         add(std::make_unique<Telegraph>(clock, target, switches));
@@ -230,11 +230,11 @@ class TermList {
     // For the bias both are listed effects, and a step of delta is a slipped index.
     for (const Target& target : {kScale, kH, kRoll}) {
       add_steps(clock, target);
-      add(decay(clock, target));
+      add(decay(clock, target, longest_s()));
     }
     for (const StepEdge edge : {StepEdge::sharp, StepEdge::gradual})
       add_tilt(step(clock, kTilt, edge));
-    add_tilt(decay(clock, kTilt));
+    add_tilt(decay(clock, kTilt, longest_s()));
     add_tilt(logarithm(clock, kTilt));
     add(in_both_directions(wave(clock, kTilt, {0.5, 0.5, 20})));
     for (const auto& shape : {bell, passage}) {

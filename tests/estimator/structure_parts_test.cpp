@@ -81,16 +81,16 @@ class Model {
     found_.fit.whitened_jacobian = Eigen::MatrixXd::Zero(3 * kVisits, 12);
     for (Eigen::Index k = 0; k < 12; ++k) found_.fit.whitened_jacobian(3 * kVisits - 12 + k, k) = 1;
   }
-  Model& with(const std::string& id, std::size_t axis, double sigmas) {
+  Model& with(const std::string& id, std::size_t axis, double sigmas, double size = 1) {
     for (const Effect* effect : effect_catalogue())
-      if (effect->id() == id) add(*effect, axis, sigmas);
+      if (effect->id() == id) add(*effect, axis, sigmas, size);
     return *this;
   }
   Model& with_term(const char* driver, const char* form, const char* shape, std::size_t axis,
                    double sigmas) {
     const SmoothTerm* term = find_term(terms_, driver, form, shape);
     EXPECT_NE(term, nullptr) << driver << " " << form << " " << shape;
-    if (term != nullptr) add(*term, axis, sigmas);
+    if (term != nullptr) add(*term, axis, sigmas, 1);
     return *this;
   }
   /// Whether the first effect is a part of the others.
@@ -103,7 +103,7 @@ class Model {
   static constexpr Eigen::Index kVisits = 8;
 
   /// Its first amplitude moves a reading of x at a visit of its own by as many sigmas.
-  void add(const Effect& effect, std::size_t axis, double sigmas) {
+  void add(const Effect& effect, std::size_t axis, double sigmas, double size) {
     const auto infos = effect.parameters();
     ActiveEffect active{&effect,
                         axis,
@@ -115,7 +115,7 @@ class Model {
     });
     const auto at = static_cast<std::size_t>(amplitude - infos.begin());
     ASSERT_LT(at, infos.size());
-    active.p[at] = 1;
+    active.p[at] = size;
     active.free[at] = true;
     found_.fit.parameters.effects.push_back(active);
     found_.evidence.push_back({{}, 0, sigmas});
@@ -160,6 +160,19 @@ TEST(StructureParts, DriverFormAndAxisAreTheSame) {
                    .with("rig.base_roll", 0, 20)
                    .with_term("h_deg", "geometry", "wave, added to h", 0, 20)
                    .first_is_part());
+}
+
+TEST(StructureParts, WhatGoesToAndFroThreeTimesSwitches) {
+  const auto steps = [](std::size_t axis_of_last, double size_of_last) {
+    return Model()
+        .with("sensor.bias_step", 0, 20, 1)
+        .with("sensor.bias_step", 0, 20, 1)
+        .with("sensor.bias_step", axis_of_last, 20, size_of_last)
+        .first_is_part();
+  };
+  EXPECT_TRUE(steps(0, -1));
+  EXPECT_FALSE(steps(0, 1));
+  EXPECT_FALSE(steps(1, -1));
 }
 
 // Beside a function that moves the head as far, a pose at a wrong angle may be a pose at which the
