@@ -207,8 +207,17 @@ bool name_unlisted(SearchModel& model) {
       return true;
   const Some named =
       candidates_that(model, [](const Candidate& candidate) { return candidate.has_name(); });
-  parallel_for(subsets.size(),
-               [&](std::size_t s) { names[s] = names_for(model, named, subsets[s]); });
+  // To first order something else comes before what moves the head by several degrees.
+  const Some of_head = candidates_that(model, [](const Candidate& candidate) {
+    return candidate.has_name() && candidate.effect->subject() == Subject::head;
+  });
+  parallel_for(subsets.size(), [&](std::size_t s) {
+    names[s] = names_for(model, named, subsets[s]);
+    const bool moves_head = std::all_of(subsets[s].begin(), subsets[s].end(), [&](std::size_t k) {
+      return model.candidate(k).effect->subject() == Subject::head;
+    });
+    if (names[s].empty() && moves_head) names[s] = names_for(model, of_head, subsets[s]);
+  });
   for (std::size_t s = 0; s < subsets.size(); ++s) {
     const std::size_t now = subsets[s].size();
     const auto more = static_cast<double>(std::max(names[s].size(), now) - now);

@@ -25,8 +25,11 @@ class Polynomial final : public DrivenTerm {
   std::vector<ParameterInfo> parameters() const override {
     std::vector<ParameterInfo> infos = {{"low", variable().unit(), ParameterRole::index},
                                         {"high", variable().unit(), ParameterRole::index}};
-    for (int d = first_degree(); d <= degree_; ++d)
+    for (int d = first_degree(); d <= degree_; ++d) {
       infos.push_back({"p" + std::to_string(d), target().unit(), ParameterRole::amplitude});
+      // What is there all the time has a name.
+      infos.back().needed = degree_ == 1 && first_degree() == 0 && d == 1;
+    }
     if (has_reference()) infos.push_back({"ref", variable().unit(), ParameterRole::index});
     return infos;
   }

@@ -23,6 +23,21 @@ SyntheticOptions fine_turns() {
   return options;
 }
 
+// A straight line of the column without a slope, towards a direction of its own, had been both.
+TEST(Structure, WhatIsThereAllTheTimeFollowsNoColumn) {
+  SyntheticOptions options = fine_turns();
+  options.random_order = true;
+  options.roll_error_deg = [](double, double) { return 9.4; };
+  options.h_error_deg = [](double, double) { return 6.8; };
+  const Calibration result = calibrated(
+      with_column(options, "motor_A", [](double t_s) { return 0.4 + 0.1 * std::sin(t_s / 40); }));
+  SCOPED_TRACE(result.diagnosis.reason);
+  EXPECT_THAT(result.diagnosis.unlisted, IsEmpty());
+  ASSERT_THAT(result.diagnosis.effects, SizeIs(2));
+  EXPECT_EQ(result.diagnosis.effects[0].id, "rig.base_roll");
+  EXPECT_EQ(result.diagnosis.effects[1].id, "rig.tilt_index");
+}
+
 // As a step of h and a step of the base roll.
 TEST(Structure, ABaseTiltsTowardsADirectionOfItsOwn) {
   constexpr double kTilt_deg = 0.8, kDirection_deg = 30;
