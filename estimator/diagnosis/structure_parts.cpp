@@ -1,6 +1,7 @@
 #include "estimator/diagnosis/structure_parts.h"
 
 #include <algorithm>
+#include <cassert>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +18,7 @@ namespace plumbline {
 namespace {
 
 const SmoothTerm* term_of(const ActiveEffect& active) {
+  assert(active.effect != nullptr);
   return dynamic_cast<const SmoothTerm*>(active.effect);
 }
 
