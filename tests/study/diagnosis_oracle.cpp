@@ -233,8 +233,10 @@ Told told_response(const SetDesign& design, const StudySet& set) {
                  (mean_voltages(fresh, i) - A_fresh * twelve.value -
                   told(12) * (mean_voltages(fresh_with, i) - mean_voltages(fresh_without, i))));
   }
+  // Who is not told would have to estimate all parameters of the effect.
+  const auto parameters = 12 + std::ssize(set.effects.front().parameters);
   return {over_axes(mps2),
-          criterion((y - whitened * told).squaredNorm(), mean_rows(log), told.size())};
+          criterion((y - whitened * told).squaredNorm(), mean_rows(log), parameters)};
 }
 
 }  // namespace
