@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <iterator>
+#include <utility>
 #include <vector>
 
 namespace plumbline {
@@ -13,6 +14,13 @@ inline double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ssize(values) / 2;
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Standard deviation of the Gaussian noise of which these are the distances from its mean, by
+/// their median: a few that are far off do not count. Precondition: not empty.
+inline double sd_of_distances(std::vector<double> distances) {
+  constexpr double kMedianDistance = 0.6745;  // in standard deviations
+  return median(std::move(distances)) / kMedianDistance;
 }
 
 }  // namespace plumbline

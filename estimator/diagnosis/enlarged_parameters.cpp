@@ -11,7 +11,7 @@ std::vector<std::size_t> axes_of(const ActiveEffect& active) {
 }
 
 ActiveEffect activate(const Effect& effect, std::size_t axis, const Hypothesis& hypothesis) {
-  ActiveEffect active{&effect, axis, hypothesis.p, {}, {}};
+  ActiveEffect active{&effect, axis, hypothesis.p, {}};
   const auto parameters = effect.parameters();
   assert(parameters.size() == hypothesis.p.size());
   for (std::size_t k = 0; k < parameters.size(); ++k) {

@@ -341,8 +341,10 @@ std::optional<Explained> explain(const ExplainInput& input, const CalibrationOpt
   const SearchInput estimated_search{estimated_log,   observed, input.noise,  input.processes,
                                      search.known_V2, start,    &input.pooled};
   std::optional<CodeEstimate>& codes = searched.codes;
-  if (!codes) mark_parts_of_structures(log, found);
-  if (!codes) codes = estimate_from_codes(search, input.input.run, found);
+  if (!codes) {
+    mark_parts_of_structures(log, found);
+    codes = estimate_from_codes(search, input.input.run, found);
+  }
 
   const EnlargedEstimate by_means = found.fit;
   const Eigen::MatrixXd jacobian = prediction_jacobian(log, found.fit.parameters);

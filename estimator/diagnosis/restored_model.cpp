@@ -33,11 +33,8 @@ std::vector<ActiveEffect> instances(const Effect& effect, std::size_t axis,
   }
   std::vector<ActiveEffect> found;
   for (const auto& value : values) {
-    ActiveEffect active{&effect,
-                        axis,
-                        std::vector<double>(infos.size()),
-                        std::vector<bool>(infos.size(), false),
-                        {}};
+    ActiveEffect active{&effect, axis, std::vector<double>(infos.size()),
+                        std::vector<bool>(infos.size(), false)};
     bool whole = true;
     for (std::size_t k = 0; k < infos.size(); ++k) {
       active.p[k] = value[k].value_or(0);
@@ -87,7 +84,7 @@ RestoredModel restore_model(const CertifiedModel& model, const VisitLog& log, Re
   for (const auto& effect : model.own_effects) named.push_back(effect.get());
   for (auto& effect : covariate_effects(log)) restored.owned.push_back(std::move(effect));
   const std::vector<std::shared_ptr<const Effect>> columns = restored.owned;
-  /// Whether anything is there by that id.
+  // Says whether anything is there by that id.
   const auto restore_named = [&](const std::string& id, const std::vector<std::size_t>& axes,
                                  const std::vector<EffectParameter>& reported) {
     const std::size_t before = parameters.effects.size();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -27,10 +28,10 @@ bool act_on_the_same(const ActiveEffect& one, const ActiveEffect& other) {
          (one.effect->subject() == Subject::head || one.axis == other.axis);
 }
 
-/// The driver that both follow in the same form.
+/// The driver that both, which act on the same, follow in the same form.
 std::optional<std::string> common_driver(const ActiveEffect& named, const ActiveEffect& unnamed) {
   const auto of_named = drivers_of(*named.effect, named.axis);
-  if (!of_named || !act_on_the_same(named, unnamed)) return {};
+  if (!of_named) return {};
   const SmoothTerm& term = *term_of(unnamed);
   const std::string column = recorded_column(term.driver());
   for (const std::string& driver : of_named->drivers) {
@@ -43,15 +44,31 @@ std::optional<std::string> common_driver(const ActiveEffect& named, const Active
   return {};
 }
 
-/// How far an effect moves the whitened readings at each visit, beside the 12 parameters.
-Eigen::VectorXd moved_at_visits(const EnlargedFit& fit, Eigen::Index n,
-                                const Eigen::MatrixXd& twelve, std::size_t effect) {
+/// How far an effect moves the whitened readings of a visit at most, beside the 12 parameters.
+double most_moved(const EnlargedFit& fit, Eigen::Index visits, std::size_t effect) {
+  const Eigen::MatrixXd twelve = orthonormal_basis(fit.whitened_jacobian.leftCols(4 * kAxisCount));
   const Eigen::VectorXd all = whitened_contribution(fit, effect);
   const Eigen::VectorXd own = all - twelve * (twelve.transpose() * all);
-  Eigen::VectorXd square = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd square = Eigen::VectorXd::Zero(visits);
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
-    square += own.segment(static_cast<Eigen::Index>(axis) * n, n).cwiseAbs2();
-  return square.cwiseSqrt();
+    square += own.segment(static_cast<Eigen::Index>(axis) * visits, visits).cwiseAbs2();
+  return std::sqrt(square.maxCoeff());
+}
+
+/// The driver of structure `unnamed` of which effect `named` is a part; nothing where it is none.
+std::optional<std::string> driver_of_whole(const SearchResult& found, Eigen::Index visits,
+                                           std::size_t named, std::size_t unnamed) {
+  constexpr double kRemnant = 0.2;  // of what it takes to see the name
+  constexpr double kAsFar = 3;
+  const std::vector<ActiveEffect>& effects = found.fit.parameters.effects;
+  if (!act_on_the_same(effects[named], effects[unnamed])) return {};
+  if (effects[named].effect->concerns_one_visit()) {
+    if (most_moved(found.fit, visits, named) >= kAsFar * most_moved(found.fit, visits, unnamed))
+      return {};
+    return term_of(effects[unnamed])->driver();
+  }
+  if (found.evidence[unnamed].sigmas <= kRemnant * found.evidence[named].sigmas) return {};
+  return common_driver(effects[named], effects[unnamed]);
 }
 
 /// What happens at one time and stays, where there are three of one axis (or the head) or more that
@@ -95,30 +112,17 @@ std::optional<std::string> part_like(const std::string& shape) {
 }
 
 void mark_parts_of_structures(const VisitLog& log, SearchResult& found) {
-  constexpr double kRemnant = 0.2;  // of what it takes to see the name
-  constexpr double kAsFar = 3;
   std::vector<ActiveEffect>& effects = found.fit.parameters.effects;
-  const Eigen::Index n = std::ssize(log.visits);
-  std::optional<Eigen::MatrixXd> twelve;  // most models have no structures
   for (std::size_t k = 0; k < effects.size(); ++k) {
-    ActiveEffect& named = effects[k];
-    if (term_of(named) != nullptr) continue;
+    if (term_of(effects[k]) != nullptr) continue;
     double most_sigmas = 0;
     for (std::size_t u = 0; u < effects.size(); ++u) {
       const SmoothTerm* term = term_of(effects[u]);
       if (term == nullptr || found.evidence[u].sigmas <= most_sigmas) continue;
-      std::optional<std::string> driver = common_driver(named, effects[u]);
-      bool is_part = driver && found.evidence[u].sigmas > kRemnant * found.evidence[k].sigmas;
-      if (named.effect->concerns_one_visit() && act_on_the_same(named, effects[u])) {
-        if (!twelve)
-          twelve = orthonormal_basis(found.fit.whitened_jacobian.leftCols(4 * kAxisCount));
-        is_part = moved_at_visits(found.fit, n, *twelve, k).maxCoeff() <
-                  kAsFar * moved_at_visits(found.fit, n, *twelve, u).maxCoeff();
-        driver = term->driver();
-      }
-      if (!is_part) continue;
+      const auto driver = driver_of_whole(found, std::ssize(log.visits), k, u);
+      if (!driver) continue;
       most_sigmas = found.evidence[u].sigmas;
-      named.part_of = StructurePart{*driver, to_string(term->form())};
+      effects[k].part_of = StructurePart{*driver, to_string(term->form())};
     }
   }
   mark_what_switches(effects);

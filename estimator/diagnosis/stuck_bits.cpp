@@ -11,6 +11,7 @@
 #include "estimator/effects/catalogue.h"
 #include "estimator/fit/least_squares.h"
 #include "estimator/fit/rounding.h"
+#include "estimator/median.h"
 #include "estimator/noise/square.h"
 #include "estimator/pose_means.h"
 
@@ -193,9 +194,7 @@ class BitsGivenBack {
                             static_cast<double>(readings_V.size());
       distance_V.push_back(std::abs(mean_V - expected_V(static_cast<Eigen::Index>(k))));
     }
-    const auto middle = distance_V.begin() + std::ssize(distance_V) / 2;
-    std::nth_element(distance_V.begin(), middle, distance_V.end());
-    return *middle / 0.6745;
+    return sd_of_distances(std::move(distance_V));
   }
   static Eigen::VectorXd means_V(const MeasurementSet& run, std::size_t axis) {
     return mean_voltages(pose_means(run), axis);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -38,13 +39,12 @@ struct Trace {
 /// sure: noise was estimated beside a model that is wrong, and what differs from one visit to the
 /// next may be the effect.
 double scatter_V(const SearchModel& model, std::size_t axis, const Eigen::VectorXd& residual_V) {
-  constexpr double kMedianOfNormal = 0.6745;
   std::vector<double> steps_V;
   for (Eigen::Index k = 1; k < residual_V.size(); ++k)
     steps_V.push_back(std::abs(residual_V(k) - residual_V(k - 1)));
   const Eigen::VectorXd sd_V = model.stage().whitening.lower[axis].diagonal();
   return std::min(median({sd_V.begin(), sd_V.end()}),
-                  median(std::move(steps_V)) / (kMedianOfNormal * std::sqrt(2.0)));
+                  sd_of_distances(std::move(steps_V)) / std::sqrt(2.0));
 }
 
 /// Nothing where an axis shows no noise at all, or the term does nothing.
@@ -252,9 +252,10 @@ struct Proposal {
   SearchModel::Entry entry;
   double saved = 0;  ///< in χ² and prices
 };
+/// `without`: the fit without that subset.
 std::optional<Proposal> switching_for(const SearchModel& model, const Candidate& candidate,
-                                      const std::vector<std::size_t>& subset) {
-  const EnlargedFit without = model.fit_without(subset);
+                                      const std::vector<std::size_t>& subset,
+                                      const EnlargedFit& without) {
   if (!without.determined) return {};
   const auto trace = trace_of(model, without, candidate);
   if (!trace) return {};
@@ -281,12 +282,16 @@ std::optional<Proposal> switching_for(const SearchModel& model, const Candidate&
 
 bool tell_by_switching(SearchModel& model) {
   std::vector<Proposal> proposals;
+  std::map<std::vector<std::size_t>, EnlargedFit> without;  // the same for bias and scale, say
   for (const Candidate& candidate : model.list().candidates) {
     const Telegraph* telegraph = telegraph_of(candidate);
     if (telegraph == nullptr || telegraph->switches() != Telegraph::kFewest) continue;
-    for (const std::vector<std::size_t>& subset : replaceable(model, candidate))
-      if (auto proposal = switching_for(model, candidate, subset))
+    for (const std::vector<std::size_t>& subset : replaceable(model, candidate)) {
+      auto fit = without.find(subset);
+      if (fit == without.end()) fit = without.emplace(subset, model.fit_without(subset)).first;
+      if (auto proposal = switching_for(model, candidate, subset, fit->second))
         proposals.push_back(*std::move(proposal));
+    }
   }
   std::stable_sort(proposals.begin(), proposals.end(),
                    [](const Proposal& a, const Proposal& b) { return a.saved > b.saved; });

@@ -114,6 +114,13 @@ class DrivenTerm : public SmoothTerm {
     return target_.form == TermForm::scale && !target_.second &&
            driver_->component == (axis + target_.other) % kAxisCount;
   }
+  /// Of a clock: the share of a visit's dwell between two times.
+  double share_between(std::size_t axis, std::size_t visit, double from_s, double to_s) const {
+    const double middle_s = driver_->value[axis][visit], half_s = 0.5 * driver_->dwell_s[visit];
+    if (!(half_s > 0)) return middle_s > from_s && middle_s < to_s ? 1 : 0;
+    const double there_s = std::min(middle_s + half_s, to_s) - std::max(middle_s - half_s, from_s);
+    return std::clamp(there_s / (2 * half_s), 0.0, 1.0);
+  }
   /// A part of what lies between two visits, over which an edge is spread so that it can be moved.
   double part_of_spacing() const {
     constexpr double kPart = 0.25;

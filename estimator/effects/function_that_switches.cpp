@@ -169,16 +169,13 @@ class Window final : public DrivenTerm {
   std::string function() const override { return "window"; }
   /// Of a dwell in which an edge lies it is there for a part.
   double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
-    const double middle_s = variable().value[axis][visit];
     if (p[2] > 0) {
+      const double middle_s = variable().value[axis][visit];
       const double begun = 1 / (1 + std::exp((p[0] - middle_s) / p[2]));
       const double ended = 1 / (1 + std::exp((p[1] - middle_s) / p[2]));
       return p[3] * (begun - ended);
     }
-    const double half_s = 0.5 * variable().dwell_s[visit];
-    if (!(half_s > 0)) return middle_s > p[0] && middle_s < p[1] ? p[3] : 0;
-    const double there_s = std::min(middle_s + half_s, p[1]) - std::max(middle_s - half_s, p[0]);
-    return p[3] * std::clamp(there_s / (2 * half_s), 0.0, 1.0);
+    return p[3] * share_between(axis, visit, p[0], p[1]);
   }
   std::vector<double> within_dwells_near(double t_s) const {
     const std::vector<double>& middles_s = variable().value[0];

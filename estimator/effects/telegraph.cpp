@@ -1,7 +1,7 @@
 #include "estimator/effects/telegraph.h"
 
-#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace plumbline {
@@ -38,14 +38,10 @@ std::string Telegraph::function() const {
 }
 
 double Telegraph::of_visit(std::size_t axis, std::size_t visit, const double* p) const {
-  const double middle_s = variable().value[axis][visit];
-  const double half_s = 0.5 * variable().dwell_s[visit];
   double there = 0;  // as a share of the dwell
-  for (int k = 0; k < switches_; ++k) {
-    const double share = half_s > 0
-                             ? std::clamp((middle_s + half_s - p[k]) / (2 * half_s), 0.0, 1.0)
-                             : (middle_s > p[k] ? 1.0 : 0.0);
-    there += k % 2 == 0 ? share : -share;
+  for (int k = 0; k < switches_; k += 2) {
+    const double back_s = k + 1 < switches_ ? p[k + 1] : std::numeric_limits<double>::infinity();
+    there += share_between(axis, visit, p[k], back_s);
   }
   return p[switches_] * there;
 }

@@ -105,11 +105,8 @@ class Model {
   /// Its first amplitude moves a reading of x at a visit of its own by as many sigmas.
   void add(const Effect& effect, std::size_t axis, double sigmas, double size) {
     const auto infos = effect.parameters();
-    ActiveEffect active{&effect,
-                        axis,
-                        std::vector<double>(infos.size(), 0.0),
-                        std::vector<bool>(infos.size(), false),
-                        {}};
+    ActiveEffect active{&effect, axis, std::vector<double>(infos.size(), 0.0),
+                        std::vector<bool>(infos.size(), false)};
     const auto amplitude = std::find_if(infos.begin(), infos.end(), [](const ParameterInfo& info) {
       return info.role == ParameterRole::amplitude;
     });

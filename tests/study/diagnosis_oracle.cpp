@@ -183,9 +183,7 @@ Told told_listed(const StudySet& set) {
     if (best.parameters.effects.empty()) return {};
     told = std::move(best);
   }
-  const double left = criterion(
-      whitening.apply(stacked_V(observed) - predict_stacked_V(log, told.parameters)).squaredNorm(),
-      mean_rows(log), told.parameters.free_count());
+  const double left = criterion(told.chi2, mean_rows(log), told.parameters.free_count());
   std::erase_if(told.parameters.effects,
                 [](const ActiveEffect& active) { return !active.effect->carries_over(); });
 
