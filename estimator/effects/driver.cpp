@@ -9,6 +9,7 @@
 
 #include "estimator/effects/effect.h"
 #include "estimator/kinematics.h"
+#include "estimator/median.h"
 
 namespace plumbline {
 namespace {
@@ -128,7 +129,7 @@ std::string recorded_column(const std::string& driver) {
 }
 
 std::string Driver::unit() const {
-  if (is_clock()) return "s";
+  if (is_clock()) return past.empty() ? "s" : "";
   if (angle || name == "h_deg") return "rad";
   if (recorded) {
     const std::string column = recorded_column(name);
@@ -293,6 +294,25 @@ std::vector<Driver> lengths_of_ways(const VisitLog& log) {
   };
   return {{"previous_pose", "turns of delta", for_all_axes(log, of_delta)},
           {"previous_pose", "turns of h", for_all_axes(log, of_h)}};
+}
+
+Driver ends_of_pauses(const VisitLog& log) {
+  constexpr double kLong = 4;  // times the median
+  std::vector<double> way_s, way_rad, pace_s;
+  for (std::size_t k = 1; k < log.visits.size(); ++k) {
+    const Visit &from = log.visits[k - 1], &to = log.visits[k];
+    way_s.push_back(to.t_arrival_s - from.t_arrival_s - from.duration_s());
+    way_rad.push_back(
+        std::max(std::abs(commanded_turn_rad(from, to)), std::abs(to.h_rad - from.h_rad)));
+    if (way_rad.back() > 0) pace_s.push_back(way_s.back() / way_rad.back());
+  }
+  const double typical_s = way_s.empty() ? 0 : median(way_s);
+  const double typical_pace_s = pace_s.empty() ? 0 : median(pace_s);
+  return {"t_s", "pauses", for_all_axes(log, [&](std::size_t k) {
+            if (k == 0) return 0.0;
+            const double typical = std::max(typical_s, typical_pace_s * way_rad[k - 1]);
+            return way_s[k - 1] > kLong * typical ? 1.0 : 0.0;
+          })};
 }
 
 Driver weight_across(const VisitLog& log) {

@@ -57,6 +57,9 @@ std::string recorded_column(const std::string& driver);
 /// change.
 std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 
+/// 1 at visits before which several times as long passed as such ways take, else 0.
+Driver ends_of_pauses(const VisitLog& log);
+
 /// By how much the components of the next axis and of the one after that changed on the way from
 /// the previous pose, under the name of what came before.
 std::vector<Driver> changes_of_others(const VisitLog& log);

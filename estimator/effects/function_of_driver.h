@@ -171,6 +171,8 @@ std::unique_ptr<SmoothTerm> line_times_line(DriverPointer driver, DriverPointer 
 /// The same in a parabola.
 std::unique_ptr<SmoothTerm> parabola_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                     const Target& target);
+/// A bell of one angle times one of another: what stands at one place beside the head.
+std::unique_ptr<SmoothTerm> spot(DriverPointer angle, DriverPointer other, const Target& target);
 /// The products of a harmonic of one angle and a harmonic of another.
 std::unique_ptr<SmoothTerm> harmonic_times_harmonic(DriverPointer angle, DriverPointer other,
                                                     const Target& target);

@@ -249,8 +249,60 @@ class HarmonicTimesHarmonic final : public DrivenTerm {
   DriverPointer other_;
 };
 
+/// Something about one place of two angles and nothing elsewhere: what stands beside the head.
+class Spot final : public DrivenTerm {
+ public:
+  Spot(DriverPointer angle, DriverPointer other, Target target)
+      : DrivenTerm(std::move(angle), target),
+        other_(std::move(other)),
+        least_width_rad_(part_of_spacing(variable())),
+        other_least_width_rad_(part_of_spacing(*other_)) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"middle", "rad", ParameterRole::shape},
+            {"width", "rad", ParameterRole::shape},
+            {"other_middle", "rad", ParameterRole::shape},
+            {"other_width", "rad", ParameterRole::shape},
+            {"p", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kAround = 18, kAcross = 5;
+    const auto [low, high] = std::minmax_element(other_->value[0].begin(), other_->value[0].end());
+    std::vector<Hypothesis> starts;
+    if (!(*high > *low) || !resolves(kAround / 3)) return starts;
+    for (int around = 0; around < kAround; ++around)
+      for (int across = 0; across < kAcross; ++across)
+        for (const double width_rad : {15 * kRadPerDeg, 35 * kRadPerDeg})
+          starts.push_back({{effect::kTurn_rad * around / kAround, width_rad,
+                             std::lerp(*low, *high, static_cast<double>(across) / (kAcross - 1)),
+                             0.6 * width_rad, target().typical_size()}});
+    return starts;
+  }
+
+ private:
+  static double part_of_spacing(const Driver& angle) {
+    constexpr double kPart = 0.4;
+    const auto [low, high] = std::minmax_element(angle.value[0].begin(), angle.value[0].end());
+    return kPart * (*high - *low) / std::max(1.0, static_cast<double>(angle.fewest_values) - 1);
+  }
+  std::string function() const override { return "bell, times a bell of " + other_->name; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double x = std::remainder(variable().value[axis][visit] - p[0], effect::kTurn_rad) / p[1];
+    const double y = (other_->value[axis][visit] - p[2]) / p[3];
+    // Between two positions it would be anything.
+    if (std::abs(p[1]) < least_width_rad_ || std::abs(p[3]) < other_least_width_rad_) return 0;
+    return p[4] * std::exp(-0.5 * (x * x + y * y));
+  }
+
+  DriverPointer other_;
+  double least_width_rad_, other_least_width_rad_;
+};
+
 }  // namespace
 
+std::unique_ptr<SmoothTerm> spot(DriverPointer angle, DriverPointer other, const Target& target) {
+  return std::make_unique<Spot>(std::move(angle), std::move(other), target);
+}
 std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPointer angle,
                                                 const Target& target) {
   return std::make_unique<LineTimesHarmonic>(std::move(driver), std::move(angle), target, 1);

@@ -56,7 +56,7 @@ class HeadDecay final : public SetOff {
   using SetOff::SetOff;
 
   std::vector<ParameterInfo> parameters() const override {
-    // true_at 0: the angle is right in the end; 1: it was right on arrival.
+    // true_at 0: the angle is right in the end; 1: it was right on arrival; 2: on average.
     return {
         amplitude("c"), {"tau", "s", ParameterRole::shape}, {"true_at", "", ParameterRole::index}};
   }
@@ -66,21 +66,30 @@ class HeadDecay final : public SetOff {
     if (!(dwell_s > 0)) return {};
     std::vector<Hypothesis> starts;
     for (const double tau_s : effect::geometric(dwell_s / 10, dwell_s * 3, 6))
-      for (const double true_at : {0.0, 1.0}) starts.push_back({{typical_size(), tau_s, true_at}});
+      for (const double true_at : {kInTheEnd, kOnArrival, kOnAverage})
+        starts.push_back({{typical_size(), tau_s, true_at}});
     return starts;
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     const Visit& at = log.visits[visit];
     const double decay = effect::mean_decay(at, at.t_arrival_s, p[1]);
-    head.*angle() += p[0] * size_rad(log, visit) * (decay - (p[2] > 0.5 ? 1 : 0));
+    head.*angle() += p[0] * size_rad(log, visit) * (decay - at_truth(at, p));
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    const Eigen::ArrayXd decay = effect::decay_since_arrival(log.visits[visit], p[1]);
-    return {angle(), p[0] * size_rad(log, visit) * (decay - (p[2] > 0.5 ? 1 : 0)).matrix()};
+    const Visit& at = log.visits[visit];
+    const Eigen::ArrayXd decay = effect::decay_since_arrival(at, p[1]);
+    return {angle(), p[0] * size_rad(log, visit) * (decay - at_truth(at, p)).matrix()};
   }
 
  private:
+  static constexpr double kInTheEnd = 0, kOnArrival = 1, kOnAverage = 2;
+
+  /// What is left of the decay where the angle is right.
+  static double at_truth(const Visit& at, const double* p) {
+    if (p[2] == kInTheEnd) return 0;
+    return p[2] == kOnArrival ? 1 : effect::mean_decay(at, at.t_arrival_s, p[1]);
+  }
   std::string function() const override { return "exponential after arrival"; }
 };
 

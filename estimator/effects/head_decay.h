@@ -13,7 +13,7 @@ namespace plumbline {
 enum class SetOffBy { arrival, weight, way, direction };
 
 /// c·exp(−(time since arrival)/τ) added to δ or h, less c where the angle was right on arrival and
-/// wanders off.
+/// wanders off, less its mean over the dwell where it is right on average.
 std::unique_ptr<SmoothTerm> head_decay(double HeadGeometry::*angle, SetOffBy by);
 
 /// A sine that every arrival sets off in δ or h and that dies away (effect::ringing()).

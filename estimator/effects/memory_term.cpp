@@ -66,10 +66,28 @@ std::vector<double> fading_sum(const VisitLog& log, const std::vector<double>& a
   return sums;
 }
 
-enum class MemoryOf { average, rest, square, sign, sum };
+/// What the value was some time before, evenly between the visits; before the first it was what it
+/// was there.
+std::vector<double> value_before(const VisitLog& log, const std::vector<double>& value,
+                                 double dead_s) {
+  std::vector<double> before(value.size());
+  std::size_t after = 0;  // the first visit that is not before
+  for (std::size_t k = 0; k < value.size(); ++k) {
+    const double t_s = log.visits[k].t_mean_s - dead_s;
+    while (log.visits[after].t_mean_s < t_s) ++after;
+    const double after_s = log.visits[after].t_mean_s;
+    before[k] = value[after];
+    if (after == 0) continue;
+    const double from_s = log.visits[after - 1].t_mean_s;
+    before[k] = std::lerp(value[after - 1], value[after], (t_s - from_s) / (after_s - from_s));
+  }
+  return before;
+}
 
-/// One variable and its averages, what it is above them, the averages of its square or sign, or its
-/// fading sum.
+enum class MemoryOf { average, rest, square, sign, sum, dead_time };
+
+/// One variable and its averages, what it is above them, the averages of its square or sign, its
+/// fading sum, or what it was before.
 class Memory {
  public:
   Memory(const DriverPointer& driver, MemoryOf of, const VisitLog& log)
@@ -92,12 +110,18 @@ class Memory {
   }
   std::string words() const {
     const std::string& past = driver_->past;
+    if (of_ == MemoryOf::dead_time) return "the value a dead time before";
     return std::string(vanishes_at_rest() ? "the change from " : "") +
            (of_ == MemoryOf::sum ? "the fading sum" : "the average of the past") +
            (of_ == MemoryOf::square ? " of its square"
             : of_ == MemoryOf::sign ? " of its sign"
                                     : "") +
            (past.empty() ? "" : " of the " + past);
+  }
+  /// How much of what was before t0_s, which nobody saw, a visit still shows.
+  double share_of_beginning(const Visit& visit, double t0_s, double tau_s) const {
+    if (of_ == MemoryOf::dead_time) return visit.t_mean_s - tau_s < t0_s ? 1 : 0;
+    return effect::mean_decay(visit, t0_s, tau_s);
   }
   bool is_shown() const { return of_ != MemoryOf::square || shows_square_; }
   std::vector<std::string> columns() const { return driver_->columns(); }
@@ -139,10 +163,14 @@ class Memory {
     for (const double tau_s : time_constants_s()) {
       auto& averages = table_.emplace_back();
       for (std::size_t source = 0; source < sources(); ++source)
-        averages.push_back(of_ == MemoryOf::sum
-                               ? fading_sum(log_, driver_->value[source], tau_s)
-                               : average_of_the_past(log_, driver_->value[source], between, tau_s));
+        averages.push_back(at_time_constant(driver_->value[source], between, tau_s));
     }
+  }
+  std::vector<double> at_time_constant(const std::vector<double>& value, InBetween between,
+                                       double tau_s) const {
+    if (of_ == MemoryOf::sum) return fading_sum(log_, value, tau_s);
+    if (of_ == MemoryOf::dead_time) return value_before(log_, value, tau_s);
+    return average_of_the_past(log_, value, between, tau_s);
   }
 
   static DriverPointer squared(Driver driver) {
@@ -246,8 +274,7 @@ class MemoryTerm final : public SmoothTerm {
   double of_visit(const VisitLog& log, std::size_t axis, std::size_t visit, const double* p) const {
     const double t0_s = p[2], tau_s = p[3];
     if (!(tau_s > 0) || tau_s > longest_s_) return 0;
-    // What was remembered before the first visit, nobody saw.
-    const double start = p[4] * effect::mean_decay(log.visits[visit], t0_s, tau_s);
+    const double start = p[4] * memory_->share_of_beginning(log.visits[visit], t0_s, tau_s);
     const double slope = 2 * p[5] / (p[1] - p[0]);
     const double mean = target_.mean_in_the_twelve() ? 0 : p[7];
     return mean + start + slope * (memory_->at(tau_s, axis, visit) - p[6]);
@@ -285,11 +312,17 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
     terms.push_back(std::make_unique<MemoryTerm>(std::make_shared<const Memory>(driver, of, log),
                                                  target, longest_s));
   };
-  for (const DriverPointer& column : columns) add(column, MemoryOf::square, kBias);
+  for (const DriverPointer& column : columns) {
+    add(column, MemoryOf::square, kBias);
+    // What flows arrives later.
+    for (const Target& target : {kBias, kScale, kH}) add(column, MemoryOf::dead_time, target);
+  }
   // What it draws heats; where it rests, charges gather; what it warms on one side bends.
   for (const MemoryOf of : {MemoryOf::square, MemoryOf::sign}) add(attitude, of, kBias);
   for (Driver& other : loads_of_others(log)) add(shared(std::move(other)), MemoryOf::rest, kBias);
   for (Driver& ways : lengths_of_ways(log)) add(shared(std::move(ways)), MemoryOf::sum, kBias);
+  for (const Target& target : {kBias, kScale})
+    add(shared(ends_of_pauses(log)), MemoryOf::sum, target);
   add(shared(weight_across(log)), MemoryOf::average, kH);
   return terms;
 }

@@ -13,8 +13,10 @@ class IndexSlip final : public Effect {
     return {{"epsilon", "deg", ParameterRole::amplitude}, {"pose", "", ParameterRole::index}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
+    // One pose at the end, or at the beginning, that is off is rig.pose_outlier.
+    constexpr std::size_t kFewest = 2;
     std::vector<Hypothesis> starts;
-    for (std::size_t k = 1; k < log.visits.size(); ++k) {
+    for (std::size_t k = kFewest; k + kFewest <= log.visits.size(); ++k) {
       starts.push_back({{effect::kSmallAngle_deg, static_cast<double>(k)}});
     }
     return starts;

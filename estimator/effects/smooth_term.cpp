@@ -62,6 +62,23 @@ Driver angle_without_return(const VisitLog& log) {
   return driver;
 }
 
+/// What δ went since the first pose, turn upon turn, always the shorter way round; half turns
+/// forwards or backwards, which is for the controller to say.
+Driver turns_added_up(const VisitLog& log, bool forwards) {
+  constexpr double kNearly_rad = 1e-6;
+  Driver driver{"previous_pose", "sum of the turns of delta", {}};
+  if (!forwards) driver.past += ", half turns backwards";
+  driver.reference = 0;
+  double sum_rad = 0;
+  for (std::size_t k = 0; k < log.visits.size(); ++k) {
+    const double turn_rad = k > 0 ? shorter_turn_rad(log.visits[k - 1], log.visits[k]) : 0;
+    const bool is_half = std::abs(std::abs(turn_rad) - effect::kTurn_rad / 2) < kNearly_rad;
+    sum_rad += is_half ? std::copysign(turn_rad, forwards ? 1 : -1) : turn_rad;
+    for (auto& values : driver.value) values.push_back(sum_rad);
+  }
+  return driver;
+}
+
 /// An angle that follows the load as it turns with the tilt.
 std::array<Target, 2> pulled(const Target& angle) {
   Target by_cosine = angle, by_sine = angle;
@@ -149,6 +166,7 @@ class TermList {
   void add_of(const DriverPointer& driver) {
     const bool clock = driver->is_clock(), column = driver->recorded && !driver->is_rate();
     if (driver->angle || driver->name == "h_deg") angles_.push_back(driver);
+    if (driver->name == "h_deg" || driver->component) attitude_.push_back(driver);
     if (clock) clock_ = driver;
     if (driver->two_valued) {
       for (const Target& target : {kBias, kScale, kH}) add_polynomials(driver, target, {1});
@@ -273,7 +291,7 @@ class TermList {
     add_polynomials_of_others(angle, {2, 3});
     for (const Target& target : {kDelta, kH}) add(one_position(angle, target));
     for (const Target& target : {kDelta, kH}) add(thrown(angle, target));
-    for (const Target& target : {kBias, kDelta, kH}) {
+    for (const Target& target : {kBias, kScale, kDelta, kH}) {
       add(bell(angle, target));
       add(sector(angle, target));
     }
@@ -287,7 +305,8 @@ class TermList {
     for (const Target& target : {kBias, kH, kDelta, kRoll})
       add(wave(h, target, {2 * turns, turns, 18 * turns}, 2 * spacing_of(*h)));
     add_polynomials(h, kRoll, {1, 2, 3, 5});
-    add(bell(h, kBias));
+    for (const Target& target : {kBias, kScale}) add(bell(h, target));
+    for (const Target& target : {kBias, kScale, kDelta, kH}) add(bend(h, target));
     add_steps(h, kRoll);
     for (const Target& target : {kDelta, kH}) {
       add(one_position(h, target));
@@ -312,6 +331,7 @@ class TermList {
     if (clock_) followed.push_back(clock_);
     if (angles_.size() == 2) {
       add(harmonic_times_harmonic(angles_[0], angles_[1], kBias));
+      add(spot(angles_[0], angles_[1], kBias));
       followed.push_back(angles_[1]);
     }
     for (const DriverPointer& rate : rates_)
@@ -344,7 +364,18 @@ class TermList {
     for (const Target& target : {kDelta, kH, kSkew}) add(wave(turn, target, {0.2, 0.2, 6}));
     add(saw_tooth(turn, kDelta));
     add(relay(turn, kBias));
+    const auto forwards = shared(turns_added_up(log_, true));
+    const auto backwards = shared(turns_added_up(log_, false));
+    add_of_turns(forwards);
+    if (any_ || backwards->value != forwards->value) add_of_turns(backwards);
     if (angles_.size() == 2) add(line_times_line(turn, angles_[1], kBias));
+  }
+  void add_of_turns(const DriverPointer& added_up) {
+    const auto [low, high] =
+        std::minmax_element(added_up->value[0].begin(), added_up->value[0].end());
+    if (!any_ && *high - *low < effect::kTurn_rad) return;  // it is the angle
+    for (const Target& target : {kBias, kScale, kDelta, kH})
+      add_polynomials(added_up, target, {1, 2, 3});
   }
   /// What goes with the direction of the last move, and not always alike.
   void add_of_directions() {
@@ -372,10 +403,11 @@ class TermList {
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
       add(swinging_angle(angle));
     }
-    for (const auto* drivers : {&columns_, &rates_})
+    for (const auto* drivers : {&columns_, &rates_, &attitude_})
       for (const DriverPointer& driver : *drivers)
         for (const StrengthBy by : {StrengthBy::value, StrengthBy::size})
-          add(line_of_column(driver, by));
+          add(line_of_driver(driver, by));
+    for (const DriverPointer& driver : attitude_) add(line_of_driver(driver, StrengthBy::square));
     for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad})
       for (const SetOffBy by :
            {SetOffBy::arrival, SetOffBy::weight, SetOffBy::way, SetOffBy::direction}) {
@@ -401,6 +433,7 @@ class TermList {
   bool any_;
   std::vector<DriverPointer> columns_;     ///< recorded, but for their rates
   std::vector<DriverPointer> angles_;      ///< delta, then h
+  std::vector<DriverPointer> attitude_;    ///< h, then the components of the specific force
   std::vector<DriverPointer> directions_;  ///< two-valued
   std::vector<DriverPointer> rates_;       ///< of recorded columns
   DriverPointer clock_;

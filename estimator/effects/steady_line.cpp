@@ -37,31 +37,40 @@ class SwingingAngle final : public HeadInDwell {
   std::string function() const override { return "sine"; }
 };
 
-class LineOfColumn final : public SmoothTerm {
+class LineOfDriver final : public SmoothTerm {
  public:
-  LineOfColumn(DriverPointer column, StrengthBy by) : column_(std::move(column)), by_(by) {}
+  LineOfDriver(DriverPointer driver, StrengthBy by) : driver_(std::move(driver)), by_(by) {}
 
-  std::string id() const override { return "unlisted:" + column_->name + ":sample"; }
-  const std::string& driver() const override { return column_->name; }
+  std::string id() const override { return "unlisted:" + driver_->name + ":sample"; }
+  const std::string& driver() const override { return driver_->name; }
   TermForm form() const override { return TermForm::sample; }
   std::string shape() const override {
-    return by_ == StrengthBy::size ? "straight line, times a sine in its size"
-                                   : "straight line, times a sine";
+    switch (by_) {
+      case StrengthBy::size:
+        return "straight line, times a sine in its size";
+      case StrengthBy::square:
+        return "parabola, times a sine";
+      case StrengthBy::value:
+        break;
+    }
+    return "straight line, times a sine";
   }
   Subject subject() const override { return Subject::sensor; }
   bool within_dwell() const override { return true; }
-  std::vector<std::string> columns() const override { return column_->columns(); }
+  std::vector<std::string> columns() const override { return driver_->columns(); }
   std::vector<ParameterInfo> parameters() const override {
-    return {{"low", column_->unit(), ParameterRole::index},
-            {"high", column_->unit(), ParameterRole::index},
-            effect::line_frequency(),
-            effect::line_phase(),
-            {"p0", "g", ParameterRole::amplitude},
-            {"p1", "g", ParameterRole::amplitude}};
+    std::vector<ParameterInfo> infos = {{"low", driver_->unit(), ParameterRole::index},
+                                        {"high", driver_->unit(), ParameterRole::index},
+                                        effect::line_frequency(),
+                                        effect::line_phase(),
+                                        {"p0", "g", ParameterRole::amplitude},
+                                        {"p1", "g", ParameterRole::amplitude}};
+    if (by_ == StrengthBy::square) infos.push_back({"p2", "g", ParameterRole::amplitude});
+    return infos;
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t axis) const override {
     const auto& line = log.line[axis];
-    const std::vector<double>& value = column_->value[axis];
+    const std::vector<double>& value = driver_->value[axis];
     auto [low, high] = std::pair(*std::min_element(value.begin(), value.end()),
                                  *std::max_element(value.begin(), value.end()));
     if (!line || !line->steady || !(high > low)) return {};
@@ -70,8 +79,12 @@ class LineOfColumn final : public SmoothTerm {
       high = std::max(-low, high);
       low = 0;
     }
-    return {{{low, high, line->f_hz, effect::start_of_phase_deg(*line), effect::kSmallTerm,
-              effect::kSmallTerm}}};
+    std::vector<double> p(parameters().size(), effect::kSmallTerm);
+    p[0] = low;
+    p[1] = high;
+    p[2] = line->f_hz;
+    p[3] = effect::start_of_phase_deg(*line);
+    return {{std::move(p)}};
   }
   double term_g(const TermInput& input, const double* p) const override {
     return size_g(input, p) * effect::mean_of_sine(input.at(), p[2], p[3]);
@@ -82,12 +95,13 @@ class LineOfColumn final : public SmoothTerm {
 
  private:
   double size_g(const TermInput& input, const double* p) const {
-    const double of_column = column_->value[input.axis][input.visit];
-    const double value = by_ == StrengthBy::size ? std::abs(of_column) : of_column;
-    return p[4] + p[5] * (2 * value - p[0] - p[1]) / (p[1] - p[0]);
+    const double of_driver = driver_->value[input.axis][input.visit];
+    const double value = by_ == StrengthBy::size ? std::abs(of_driver) : of_driver;
+    const double x = (2 * value - p[0] - p[1]) / (p[1] - p[0]);
+    return p[4] + p[5] * x + (by_ == StrengthBy::square ? p[6] * (1.5 * x * x - 0.5) : 0);
   }
 
-  DriverPointer column_;
+  DriverPointer driver_;
   StrengthBy by_;
 };
 
@@ -96,8 +110,8 @@ class LineOfColumn final : public SmoothTerm {
 std::unique_ptr<SmoothTerm> swinging_angle(double HeadGeometry::*angle) {
   return std::make_unique<SwingingAngle>(angle);
 }
-std::unique_ptr<SmoothTerm> line_of_column(DriverPointer column, StrengthBy by) {
-  return std::make_unique<LineOfColumn>(std::move(column), by);
+std::unique_ptr<SmoothTerm> line_of_driver(DriverPointer driver, StrengthBy by) {
+  return std::make_unique<LineOfDriver>(std::move(driver), by);
 }
 
 }  // namespace plumbline

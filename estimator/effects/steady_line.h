@@ -11,10 +11,11 @@ namespace plumbline {
 /// An angle of the head that swings: a servo that hunts. `angle`: δ or h.
 std::unique_ptr<SmoothTerm> swinging_angle(double HeadGeometry::*angle);
 
-/// By what of a recorded column a line is as strong as it is.
-enum class StrengthBy { value, size };
-/// A line of one axis that is as strong as a straight line of a recorded column, or of its size
-/// where it takes both signs, says: a machine that runs or does not.
-std::unique_ptr<SmoothTerm> line_of_column(DriverPointer column, StrengthBy by);
+/// By what of a driver a line is as strong as it is: a straight line in it or, where it takes both
+/// signs, in its size, or a parabola.
+enum class StrengthBy { value, size, square };
+/// A line of one axis that is as strong as a driver says: a machine that runs or does not; a
+/// shaking that an axis sees the more, the more it lies along it.
+std::unique_ptr<SmoothTerm> line_of_driver(DriverPointer driver, StrengthBy by);
 
 }  // namespace plumbline

@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <functional>
+#include <numbers>
 #include <utility>
 
 #include "estimator/calibrate.h"
@@ -40,6 +43,14 @@ inline UnlistedStructure expect_only_structure(const SyntheticRun& data,
 inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
                                                const Structure& expected) {
   return expect_only_structure(synthetic_run(7, kSixteenBits, options), expected);
+}
+
+inline constexpr double kDegree = std::numbers::pi / 180;
+
+/// Where the spindle stands, from 0° to 360°, by the specific force.
+inline double delta_deg_of(const std::array<double, 3>& a_g) {
+  const double delta_deg = std::atan2(-a_g[1], a_g[0]) / kDegree;
+  return delta_deg < -1e-6 ? delta_deg + 360 : delta_deg;
 }
 
 inline const EffectParameter& parameter(const UnlistedStructure& found, const char* name) {

@@ -61,6 +61,30 @@ TEST(Structure, AMachineThatRunsNowAndThenIsALineOfItsColumn) {
                         {"compressor_on", "sample", "straight line, times a sine"});
 }
 
+// As pickup and lines of columns that happened to run alike.
+TEST(Structure, AShakingAcrossTheSpindleIsALineOfTheAttitude) {
+  SyntheticOptions options = long_dwells();
+  options.more_V[1] = [](const auto& a_g, double t_s) {
+    return 3e-4 * (1 - a_g[2] * a_g[2]) * std::sin(2 * std::numbers::pi * 33.8 * t_s);
+  };
+  expect_only_structure(options, {"a_z", "sample", "parabola, times a sine"});
+}
+
+// As one that was right on arrival, and a tilt index that made up for it.
+TEST(Structure, AHeadThatSinksAboutItsPlaceIsRightOnAverage) {
+  constexpr double kTau_s = 0.1;
+  constexpr double kMean = 0.252;  // of exp(-t/0.1 s) over 40 readings of 10 ms
+  SyntheticOptions options = long_dwells();
+  options.base_tilt_rad = [](double t_s) {
+    const double since_s = since_arrival_s(t_s + 1e-9);
+    return since_s < 0 ? 0 : 5e-3 * (std::exp(-since_s / kTau_s) - kMean);
+  };
+  const UnlistedStructure found = expect_only_structure(
+      options, {"t_in_pose", "geometry", "exponential after arrival, added to h"});
+  EXPECT_EQ(parameter(found, "true_at").value, 2);
+  EXPECT_NEAR(parameter(found, "tau").value, kTau_s, 4 * parameter(found, "tau").u);
+}
+
 // As ringing and a polynomial of the change of h.
 TEST(Structure, WhatALongMoveHeatsCoolsDownInTheDwell) {
   SyntheticOptions options = long_dwells();

@@ -257,6 +257,19 @@ TEST(Structure, ACableThatFlipsOverIsARelayOfTheTurn) {
   expect_only_structure(options, {"delta_deg", "bias", "relay in the angle that does not close"});
 }
 
+// As waves and bells in time.
+TEST(Structure, WhatArrivesLaterGoesByTheValueADeadTimeBefore) {
+  constexpr double kDead_s = 30;
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  const auto flow = [](double t_s) { return 6 + std::sin(t_s / 25) + 0.7 * std::cos(t_s / 61); };
+  options.more_V[1] = [=](const auto&, double t_s) { return 4e-4 * flow(t_s - kDead_s); };
+  const UnlistedStructure found =
+      expect_only_structure(with_column(options, "flow_lpm", flow),
+                            {"flow_lpm", "bias", "straight line in the value a dead time before"});
+  EXPECT_NEAR(parameter(found, "tau").value, kDead_s, 1.5);
+}
+
 // As a bell in time.
 TEST(Structure, WhatACurrentHeatsGoesByThePastOfItsSquare) {
   SyntheticOptions options;

@@ -12,7 +12,6 @@
 namespace plumbline {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kFirst_s = 61, kPose_s = 3;  // of a synthetic run
 
 SyntheticOptions fine_turns_at_random() {
@@ -37,12 +36,6 @@ class PastAverage {
  private:
   double tau_s_, average_ = 0, held_ = 0, last_s_ = 0;
 };
-
-/// Where the spindle stands, from 0° to 360°.
-double delta_of(const std::array<double, 3>& a_g) {
-  const double delta_deg = std::atan2(-a_g[1], a_g[0]) / kDegree;
-  return delta_deg < -1e-6 ? delta_deg + 360 : delta_deg;
-}
 
 /// What a function makes of each new position and the time of arrival there, kept while it lasts.
 class AtEveryPose {
@@ -112,13 +105,43 @@ TEST(Structure, MotorsThatWarmTheHeadGoByTheirFadingWays) {
                                                                double t_s) mutable {
     heat *= std::exp((last_s - t_s) / 25);
     last_s = t_s;
-    const double delta_deg = delta_of(a_g);
+    const double delta_deg = delta_deg_of(a_g);
     heat += std::abs(std::remainder(delta_deg - at_deg, 360)) / 180;
     at_deg = delta_deg;
     return 2e-4 * heat;
   };
   expect_only_structure(
       options, {"previous_pose", "bias", "straight line in the fading sum of the turns of delta"});
+}
+
+// As fading sums of the turns.
+TEST(Structure, WhatRecoversAfterEveryPauseGoesByThePauses) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.pose_s = [](double delta_deg, double h_deg) {
+    return delta_deg == 200 && h_deg < 80 ? 90.0 : 3.0;
+  };
+  options.more_V[1] = [last_s = 0.0, resumed_s = -1e9](const auto&, double t_s) mutable {
+    if (t_s - last_s > 60) resumed_s = t_s;
+    last_s = t_s;
+    return 4e-4 * std::exp(-(t_s - resumed_s) / 25);
+  };
+  expect_only_structure(options, {"t_s", "bias", "straight line in the fading sum of the pauses"});
+}
+
+// As slips of the index.
+TEST(Structure, ACableThatWindsUpGoesByTheSumOfTheTurns) {
+  SyntheticOptions options = fine_turns_at_random();
+  options.delta_error_deg =
+      AtEveryPose([sum_deg = 0.0, at_deg = 0.0](double delta_deg, double, double) mutable {
+        const double turn_deg = std::remainder(delta_deg - at_deg, 360);
+        sum_deg += std::abs(turn_deg) == 180 ? 180 : turn_deg;
+        at_deg = delta_deg;
+        return 2e-4 * sum_deg;
+      });
+  expect_only_structure(
+      options, {"previous_pose", "geometry",
+                "polynomial of degree 1 in the sum of the turns of delta, added to delta"});
 }
 
 TEST(Structure, AnArmThatKeepsItsBendGoesByThePastOfTheWeight) {
