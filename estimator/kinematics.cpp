@@ -18,10 +18,11 @@ Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma) {
   const double up_y = sn * sh * ce - cn * se;
   const double up_z = cn * sh * ce + sn * se;
   const Eigen::Vector3d on_table(up_x * cd + up_y * sd, -up_x * sd + up_y * cd, up_z);
-  if (head.seat_x_rad == 0 && head.seat_y_rad == 0) return gamma * on_table;
+  const double lifted = gamma * (1 + head.lift);
+  if (head.seat_x_rad == 0 && head.seat_y_rad == 0) return lifted * on_table;
   const auto turned = Eigen::AngleAxisd(head.seat_y_rad, Eigen::Vector3d::UnitY()) *
                       Eigen::AngleAxisd(head.seat_x_rad, Eigen::Vector3d::UnitX());
-  return gamma * (turned.inverse() * on_table);
+  return lifted * (turned.inverse() * on_table);
 }
 
 Eigen::Vector3d slope_g_per_rad(const HeadGeometry& head, double HeadGeometry::*angle,

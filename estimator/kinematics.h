@@ -14,15 +14,16 @@ struct HeadGeometry {
   double skew_rad = 0;    ///< of the spindle against the normal of the tilt axis
   double seat_x_rad = 0;  ///< of the triad on the turntable about its own x, after that about y
   double seat_y_rad = 0;
+  double lift = 0;  ///< what accelerates the base upwards, as a share of gravity
 
   bool operator==(const HeadGeometry&) const = default;
 };
 
 /// Specific force in the sensor frame, standard g. With δ and h alone this is
-/// γ·(cos h cos δ, −cos h sin δ, sin h).
+/// γ·(cos h cos δ, −cos h sin δ, sin h). A lift makes γ larger by that share.
 Eigen::Vector3d specific_force_g(const HeadGeometry& head, double gamma);
 
-/// ∂a/∂angle of one of the angles, g/rad, by a central difference.
+/// ∂a/∂angle of one of the angles, g/rad, or of the lift, g, by a central difference.
 Eigen::Vector3d slope_g_per_rad(const HeadGeometry& head, double HeadGeometry::*angle,
                                 double gamma);
 

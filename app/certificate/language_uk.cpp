@@ -430,6 +430,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"geometry", "геометрію"},
     {"sample", "перебіг у положенні"},
     {"{}, added to delta", "{}, додається до δ"},
+    {"{}, added to gravity", "{}, додається до сили тяжіння"},
     {"{}, added to h", "{}, додається до h"},
     {"{}, added to the base roll", "{}, додається до крену основи"},
     {"{}, added to the tilt of the base", "{}, додається до нахилу основи"},

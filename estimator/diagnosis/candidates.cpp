@@ -116,10 +116,11 @@ namespace {
 
 constexpr std::array kAngles = {&HeadGeometry::delta_rad,  &HeadGeometry::h_rad,
                                 &HeadGeometry::roll_rad,   &HeadGeometry::skew_rad,
-                                &HeadGeometry::seat_x_rad, &HeadGeometry::seat_y_rad};
+                                &HeadGeometry::seat_x_rad, &HeadGeometry::seat_y_rad,
+                                &HeadGeometry::lift};
 using PerAngle = Eigen::Matrix<double, kAxisCount, kAngles.size()>;
 
-/// What each angle does to the outputs of the three axes, V/rad.
+/// What each angle, or the lift, does to the outputs of the three axes, V/rad or V.
 PerAngle slopes_V(const EnlargedParameters& model, const HeadGeometry& head, double gamma) {
   PerAngle slopes;
   for (std::size_t angle = 0; angle < kAngles.size(); ++angle) {

@@ -349,8 +349,8 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
   return line_in_courses(courses_of(set, axis));
 }
 
-std::optional<DwellLine> line_of_angle(const MeasurementSet& set,
-                                       const PerAxis<Eigen::VectorXd>& by_angle) {
+std::optional<DwellLine> line_of_all(const MeasurementSet& set,
+                                     const PerAxis<Eigen::VectorXd>& seen) {
   std::optional<Dwells> sum;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     Dwells of_axis = courses_of(set, axis);
@@ -358,7 +358,7 @@ std::optional<DwellLine> line_of_angle(const MeasurementSet& set,
     Eigen::Index k = 0;
     for (std::size_t pose = 0; pose < set.poses.size(); ++pose)
       if (set.poses[pose].count >= kFewestSamples)
-        of_axis.off_V.col(k++) *= by_angle[axis](static_cast<Eigen::Index>(pose));
+        of_axis.off_V.col(k++) *= seen[axis](static_cast<Eigen::Index>(pose));
     if (sum)
       sum->off_V += of_axis.off_V;
     else

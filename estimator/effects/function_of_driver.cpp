@@ -394,6 +394,7 @@ std::string Target::words() const {
                            : angle == &HeadGeometry::h_rad    ? ", added to h"
                            : angle == &HeadGeometry::roll_rad ? ", added to the base roll"
                            : angle == &HeadGeometry::skew_rad ? ", added to the skew of the spindle"
+                           : angle == &HeadGeometry::lift     ? ", added to gravity"
                                                               : ", added to delta";
     return std::string(grows) + to;
   }

@@ -400,9 +400,9 @@ class TermList {
       add(decay_in_dwell(of));
     for (const EventShape shape : {EventShape::step, EventShape::window})
       add(event_of_dwells(shape));
-    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad}) {
+    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad,
+                             &HeadGeometry::roll_rad, &HeadGeometry::lift})
       add(swinging_angle(angle));
-    }
     for (const auto* drivers : {&columns_, &rates_, &attitude_})
       for (const DriverPointer& driver : *drivers)
         for (const StrengthBy by : {StrengthBy::value, StrengthBy::size})

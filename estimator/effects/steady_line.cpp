@@ -15,26 +15,32 @@ class SwingingAngle final : public HeadInDwell {
   using HeadInDwell::HeadInDwell;
 
   std::vector<ParameterInfo> parameters() const override {
-    return {{"amplitude", "deg", ParameterRole::amplitude},
+    return {{"amplitude", is_lift() ? "g" : "deg", ParameterRole::amplitude},
             effect::line_frequency(),
             effect::line_phase()};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    const auto& line = is_delta() ? log.delta_line : log.h_line;
+    const auto& line = is_delta()                        ? log.delta_line
+                       : angle() == &HeadGeometry::h_rad ? log.h_line
+                       : is_lift()                       ? log.vertical_line
+                                                         : log.roll_line;
     if (!line || !line->steady) return {};
-    return {{{effect::kSmallAngle_deg, line->f_hz, effect::start_of_phase_deg(*line)}}};
+    const double small = is_lift() ? effect::kSmallTerm : effect::kSmallAngle_deg;
+    return {{{small, line->f_hz, effect::start_of_phase_deg(*line)}}};
   }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
-    head.*angle() += p[0] * kRadPerDeg * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
+    head.*angle() += p[0] * per_unit(log) * effect::mean_of_sine(log.visits[visit], p[1], p[2]);
   }
   AngleCourse angle_course(const VisitLog& log, std::size_t visit, const double* p) const override {
-    return {angle(), p[0] * kRadPerDeg * effect::sine(log.visits[visit], p[1], p[2])};
+    return {angle(), p[0] * per_unit(log) * effect::sine(log.visits[visit], p[1], p[2])};
   }
   void normalise(std::vector<double>& p) const override { effect::normalise_sine(p[0], p[2]); }
 
  private:
   std::string function() const override { return "sine"; }
+  bool is_lift() const { return angle() == &HeadGeometry::lift; }
+  double per_unit(const VisitLog& log) const { return is_lift() ? 1 / log.gamma : kRadPerDeg; }
 };
 
 class LineOfDriver final : public SmoothTerm {

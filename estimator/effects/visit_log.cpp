@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <numeric>
 
@@ -58,20 +59,18 @@ PlainFit plain_fit(const VisitLog& log, std::size_t axis) {
   return {value, mean_V - A * value};
 }
 
-/// What a small turn of one angle of the head adds to the output of an axis at every visit, over
-/// its noise.
-Eigen::VectorXd by_angle(const VisitLog& log, std::size_t axis, const Eigen::Vector4d& value,
-                         Eigen::Vector3d SpecificForce::*d_angle) {
-  Eigen::VectorXd slope(std::ssize(log.visits));
-  for (Eigen::Index k = 0; k < slope.size(); ++k) {
+/// What an axis sees of a small turn, or of anything else in g that depends on where the head
+/// stands, at every visit, over the square of its noise.
+Eigen::VectorXd seen_of(const VisitLog& log, std::size_t axis, const Eigen::Vector4d& value,
+                        const std::function<Eigen::Vector3d(const HeadGeometry&)>& along_g) {
+  Eigen::VectorXd seen_V(std::ssize(log.visits));
+  for (Eigen::Index k = 0; k < seen_V.size(); ++k) {
     const Visit& visit = log.visits[static_cast<std::size_t>(k)];
-    const SpecificForce force =
-        specific_force(visit.delta_rad / kRadPerDeg, visit.h_rad / kRadPerDeg, log.gamma);
-    slope(k) = value.head<3>().dot(force.*d_angle);
+    seen_V(k) = value.head<3>().dot(along_g({visit.delta_rad, visit.h_rad}));
   }
   const double variance_V2 = log.sample_sd_V[axis] * log.sample_sd_V[axis];
-  return variance_V2 > 0 ? Eigen::VectorXd(slope / variance_V2)
-                         : Eigen::VectorXd::Zero(slope.size());
+  return variance_V2 > 0 ? Eigen::VectorXd(seen_V / variance_V2)
+                         : Eigen::VectorXd::Zero(seen_V.size());
 }
 
 /// What is removed as slow leaves of a strong line that hardly changes within a dwell what looks
@@ -165,7 +164,8 @@ Eigen::MatrixXd contrasts_of(const Visit& visit, const VisitLog& log) {
     add(phase.cos().matrix());
   };
   for (const auto& line : log.line) add_line(line);
-  for (const auto& line : {log.delta_line, log.h_line}) add_line(line);
+  for (const auto& line : {log.delta_line, log.h_line, log.roll_line, log.vertical_line})
+    add_line(line);
   for (const auto& event : log.event) {
     if (!event) continue;
     Eigen::VectorXd course(contrasts.rows());
@@ -344,7 +344,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     if (std::all_of(log.codes.begin(), log.codes.end(), rounds_or_lacks_the_lowest_bit))
       for (CodeFaults& codes : log.codes) codes.stuck_bits.clear();
   }
-  PerAxis<Eigen::VectorXd> by_delta, by_h;
+  PerAxis<Eigen::VectorXd> by_delta, by_h, by_roll, by_lift;
   parallel_for(kAxisCount, [&](std::size_t i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
     if (log.adc) log.input_sd_V[i] = input_scatter_V(set, log, i);
@@ -353,16 +353,27 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
     const PlainFit fit = plain_fit(log, i);
-    by_delta[i] = by_angle(log, i, fit.value, &SpecificForce::d_delta_g_per_rad);
-    by_h[i] = by_angle(log, i, fit.value, &SpecificForce::d_h_g_per_rad);
+    const auto by = [&](double HeadGeometry::*angle) {
+      return seen_of(log, i, fit.value, [&](const HeadGeometry& head) {
+        return slope_g_per_rad(head, angle, log.gamma);
+      });
+    };
+    by_delta[i] = by(&HeadGeometry::delta_rad);
+    by_h[i] = by(&HeadGeometry::h_rad);
+    by_roll[i] = by(&HeadGeometry::roll_rad);
+    by_lift[i] = seen_of(log, i, fit.value, [&](const HeadGeometry& head) {
+      return specific_force_g(head, log.gamma);
+    });
     log.event[i] = event_in_dwells(set, i);
     log.line[i] = stronger(line_through_dwells(set, i), line_between_dwells(set, fit.left_V));
     if (!log.line[i]) return;
     log.line_V2[i] = between_samples_V2(*log.line[i], log.visits.front().step_s);
     if (is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
   });
-  log.delta_line = line_of_angle(set, by_delta);
-  log.h_line = line_of_angle(set, by_h);
+  log.delta_line = line_of_all(set, by_delta);
+  log.h_line = line_of_all(set, by_h);
+  log.roll_line = line_of_all(set, by_roll);
+  log.vertical_line = line_of_all(set, by_lift);
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))
       log.contrasts.emplace(visit.count, contrasts_of(visit, log));

@@ -56,10 +56,12 @@ struct VisitLog {
   PerAxis<double> smallest_step_V{};        ///< smallest difference between two different readings
   PerAxis<double> lowest_V{}, highest_V{};  ///< of all readings
   std::optional<Adc> adc;
-  bool goes_as_commanded = false;               ///< RunDescription's
-  PerAxis<std::optional<DwellLine>> line;       ///< that runs through the dwells
-  std::optional<DwellLine> delta_line, h_line;  ///< as if an angle of the head swung
-  PerAxis<std::optional<DwellEvent>> event;     ///< in every dwell
+  bool goes_as_commanded = false;          ///< RunDescription's
+  PerAxis<std::optional<DwellLine>> line;  ///< that runs through the dwells
+  /// As if an angle of the head or the base swung: a base that is shaken to and fro is one that
+  /// swings. And as if it were shaken up and down.
+  std::optional<DwellLine> delta_line, h_line, roll_line, vertical_line;
+  PerAxis<std::optional<DwellEvent>> event;  ///< in every dwell
   /// What is looked for within a dwell beside its mean, for every number of samples that occurs:
   /// samples × dwell_contrasts(), orthonormal columns of zero sum; what a dwell cannot resolve is
   /// zero. The first are step_contrasts(); then come sine and cosine of every line and every event.

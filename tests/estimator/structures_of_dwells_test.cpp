@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -68,6 +69,49 @@ TEST(Structure, AShakingAcrossTheSpindleIsALineOfTheAttitude) {
     return 3e-4 * (1 - a_g[2] * a_g[2]) * std::sin(2 * std::numbers::pi * 33.8 * t_s);
   };
   expect_only_structure(options, {"a_z", "sample", "parabola, times a sine"});
+}
+
+/// A base that is shaken along x_b, y_b and z_b by these, g.
+SyntheticRun on_a_shaken_base(const std::array<double, 3>& shaken_g) {
+  SyntheticOptions options = long_dwells();
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+    options.more_V[axis] = [=](const auto& a_g, double t_s) {
+      const double delta_rad = delta_deg_of(a_g) * kDegree;
+      const double h_rad = std::atan2(a_g[2], std::hypot(a_g[0], a_g[1]));
+      const double sd = std::sin(delta_rad), cd = std::cos(delta_rad);
+      const double x_b[] = {-std::sin(h_rad) * cd, std::sin(h_rad) * sd, std::cos(h_rad)};
+      const double y_b[] = {-sd, -cd, 0};
+      constexpr double kK_V_per_g[] = {0.032, 0.0314, -0.0328};
+      const double along_g =
+          shaken_g[0] * x_b[axis] + shaken_g[1] * y_b[axis] + shaken_g[2] * a_g[axis];
+      const bool machine_runs = since_arrival_s(t_s) >= 0;
+      return machine_runs ? kK_V_per_g[axis] * along_g * std::sin(2 * std::numbers::pi * 23.7 * t_s)
+                          : 0;
+    };
+  return synthetic_run(7, kSixteenBits, options);
+}
+
+// As lines of each axis that are as strong as the attitude says.
+TEST(Structure, ABaseThatIsShakenSwingsOrIsLifted) {
+  constexpr double kShaken_g = 0.01;
+  const auto shaken = [&](const std::array<double, 3>& shaken_g, const char* shape) {
+    const UnlistedStructure found =
+        expect_only_structure(on_a_shaken_base(shaken_g), {"t_in_pose", "geometry", shape});
+    return parameter(found, "amplitude");
+  };
+  const EffectParameter lifted = shaken({0, 0, kShaken_g}, "sine, added to gravity");
+  EXPECT_NEAR(lifted.value, kShaken_g, 4 * lifted.u);
+  const EffectParameter swung = shaken({kShaken_g, 0, 0}, "sine, added to h");
+  EXPECT_NEAR(swung.value * kDegree, kShaken_g, 4 * swung.u * kDegree);
+  const EffectParameter rolled = shaken({0, kShaken_g, 0}, "sine, added to the base roll");
+  EXPECT_NEAR(rolled.value * kDegree, kShaken_g, 4 * rolled.u * kDegree);
+
+  const Calibration askew = calibrated(on_a_shaken_base({0.8 * kShaken_g, 0.6 * kShaken_g, 0}));
+  SCOPED_TRACE(askew.diagnosis.reason);
+  EXPECT_THAT(askew.diagnosis.effects, testing::IsEmpty());
+  ASSERT_THAT(askew.diagnosis.unlisted, testing::SizeIs(2));
+  for (const UnlistedStructure& part : askew.diagnosis.unlisted)
+    EXPECT_THAT(part.shape, testing::AnyOf("sine, added to h", "sine, added to the base roll"));
 }
 
 // As one that was right on arrival, and a tilt index that made up for it.
