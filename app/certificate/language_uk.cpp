@@ -495,6 +495,7 @@ constexpr std::pair<std::string_view, std::string_view> kPhrases[] = {
     {"the way turned", "пройдений кут"},
     {"the direction of the way", "напрямок шляху"},
     {"wave", "хвиля"},
+    {"straight line, on one side of the turn", "пряма, з одного боку оберту"},
     {"half a wave", "півхвилі"},
     {"fading after a reversal", "згасання після зміни напрямку"},
     {"exponential of the time", "експонента часу"},

@@ -155,6 +155,10 @@ std::unique_ptr<SmoothTerm> line_times_harmonic(DriverPointer driver, DriverPoin
 /// line.
 std::unique_ptr<SmoothTerm> line_times_field(DriverPointer driver, DriverPointer delta,
                                              DriverPointer h, const Target& target);
+/// What comes from one side, as strong as the driver says in a straight line, and is seen by what
+/// the turn and the tilt leave turned towards it: light.
+std::unique_ptr<SmoothTerm> line_on_one_side(DriverPointer driver, DriverPointer delta,
+                                             DriverPointer h, const Target& target);
 /// With the sign of a two-valued driver: at once when it changes, then dying away by an unknown
 /// time constant.
 std::unique_ptr<SmoothTerm> fading_reversal(DriverPointer direction, DriverPointer clock,

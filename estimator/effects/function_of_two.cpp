@@ -143,6 +143,41 @@ class LineTimesField final : public DrivenTerm {
   DriverPointer delta_, h_;
 };
 
+class LineOnOneSide final : public DrivenTerm {
+ public:
+  LineOnOneSide(DriverPointer driver, DriverPointer delta, DriverPointer h, Target target)
+      : DrivenTerm(std::move(driver), target), delta_(std::move(delta)), h_(std::move(h)) {}
+
+  std::vector<ParameterInfo> parameters() const override {
+    return {{"low", variable().unit(), ParameterRole::index},
+            {"high", variable().unit(), ParameterRole::index},
+            {"middle", "rad", ParameterRole::shape, 0.1 * kRadPerDeg, true},
+            {"p0", target().unit(), ParameterRole::amplitude},
+            {"p1", target().unit(), ParameterRole::amplitude}};
+  }
+  std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
+    constexpr int kParts = 12;
+    std::vector<Hypothesis> starts;
+    if (!resolves(1) || !delta_->varies()) return starts;
+    const auto [low, high] = range();
+    const double size = target().typical_size();
+    for (int k = 0; k < kParts; ++k)
+      starts.push_back({{low, high, effect::kTurn_rad * k / kParts, size, size}});
+    return starts;
+  }
+
+ private:
+  std::string function() const override { return "straight line, on one side of the turn"; }
+  double of_visit(std::size_t axis, std::size_t visit, const double* p) const override {
+    const double towards = std::cos(delta_->value[axis][visit] - p[2]);
+    if (towards < 0) return 0;
+    const double x = position(variable().value[axis][visit], p[0], p[1]);
+    return (p[3] + p[4] * x) * towards * std::cos(h_->value[axis][visit]);
+  }
+
+  DriverPointer delta_, h_;
+};
+
 /// A straight line in one part of an angle's range and nothing elsewhere: what happens at a place
 /// where something else varies.
 class LineInAPart final : public DrivenTerm {
@@ -266,10 +301,10 @@ class Spot final : public DrivenTerm {
             {"p", target().unit(), ParameterRole::amplitude}};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
-    constexpr int kAround = 18, kAcross = 5;
+    constexpr int kAround = 12, kAcross = 4;
     const auto [low, high] = std::minmax_element(other_->value[0].begin(), other_->value[0].end());
     std::vector<Hypothesis> starts;
-    if (!(*high > *low) || !resolves(kAround / 3)) return starts;
+    if (!(*high > *low) || !resolves(kAround / 2)) return starts;
     for (int around = 0; around < kAround; ++around)
       for (int across = 0; across < kAcross; ++across)
         for (const double width_rad : {15 * kRadPerDeg, 35 * kRadPerDeg})
@@ -323,6 +358,10 @@ std::unique_ptr<SmoothTerm> line_times_field(DriverPointer driver, DriverPointer
                                              DriverPointer h, const Target& target) {
   return std::make_unique<LineTimesField>(std::move(driver), std::move(delta), std::move(h),
                                           target);
+}
+std::unique_ptr<SmoothTerm> line_on_one_side(DriverPointer driver, DriverPointer delta,
+                                             DriverPointer h, const Target& target) {
+  return std::make_unique<LineOnOneSide>(std::move(driver), std::move(delta), std::move(h), target);
 }
 std::unique_ptr<SmoothTerm> harmonic_times_harmonic(DriverPointer angle, DriverPointer other,
                                                     const Target& target) {

@@ -223,7 +223,7 @@ class Step final : public DrivenTerm {
   }
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t axis) const override {
     // In the codes of the axis itself it is a listed effect.
-    if (variable().output_of == axis) return {};
+    if (variable().output_of == axis || is_bias_in_disguise(axis)) return {};
     const auto [low, high] = range();
     const bool sharp = edge_ == StepEdge::sharp;
     std::vector<double> widths = {0.04 * (high - low), 0.13 * (high - low)};

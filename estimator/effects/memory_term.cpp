@@ -320,7 +320,10 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
   // What it draws heats; where it rests, charges gather; what it warms on one side bends.
   for (const MemoryOf of : {MemoryOf::square, MemoryOf::sign}) add(attitude, of, kBias);
   for (Driver& other : loads_of_others(log)) add(shared(std::move(other)), MemoryOf::rest, kBias);
-  for (Driver& ways : lengths_of_ways(log)) add(shared(std::move(ways)), MemoryOf::sum, kBias);
+  for (Driver& each : lengths_of_ways(log)) {
+    const auto ways = shared(std::move(each));
+    for (const Target& target : {kBias, kDelta, kH}) add(ways, MemoryOf::sum, target);
+  }
   for (const Target& target : {kBias, kScale})
     add(shared(ends_of_pauses(log)), MemoryOf::sum, target);
   add(shared(weight_across(log)), MemoryOf::average, kH);

@@ -232,6 +232,7 @@ class TermList {
     add_tilt(window(clock, kTilt));
     add_seat(step(clock, kSeat, StepEdge::sharp));
     add_seat(decay(clock, kSeat, longest_s()));
+    add_seat(logarithm(clock, kSeat));
     for (const Target& target : {kBias, kScale, kDelta, kH, kRoll})
       for (int switches = Telegraph::kFewest; switches <= Telegraph::kMost; ++switches)
         add(std::make_unique<Telegraph>(clock, target, switches));
@@ -277,6 +278,7 @@ class TermList {
     add(bend(driver, kDelta));
     add(relay(driver, kDelta));
     add_steps(driver, kBias);
+    add(step(driver, kScale, StepEdge::sharp));
     // A block that rocks, or stands on something soft at one side.
     add_seat(step(driver, kSeat, StepEdge::sharp));
     add_seat(bend(driver, kSeat));
@@ -345,7 +347,10 @@ class TermList {
       }
     if (angles_.size() == 2)
       for (const DriverPointer& driver : followed)
-        if (driver != angles_[1]) add(line_times_field(driver, angles_[0], angles_[1], kBias));
+        if (driver != angles_[1]) {
+          add(line_times_field(driver, angles_[0], angles_[1], kBias));
+          add(line_on_one_side(driver, angles_[0], angles_[1], kBias));
+        }
     // A play that the load takes up, which turns with the spindle.
     for (const DriverPointer& direction : directions_)
       if (!angles_.empty() && angles_[0]->angle)

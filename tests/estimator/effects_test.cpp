@@ -174,7 +174,7 @@ TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
          {SetOffBy::arrival, SetOffBy::weight, SetOffBy::way, SetOffBy::direction}) {
       const auto effect = head_decay(angle, by);
       const std::vector<Hypothesis> starts = effect->hypotheses(log, 0);
-      ASSERT_EQ(starts.size(), 12u);
+      ASSERT_EQ(starts.size(), 18u);
       const int visit = 17;
       const Visit &before = log.visits.at(visit - 1), &at = log.visits.at(visit);
       const double way_rad = angle == &HeadGeometry::delta_rad ? before.delta_rad - at.delta_rad
@@ -188,11 +188,13 @@ TEST(HeadDecay, IsTheGeometryOfEveryMoment) {
         const ActiveEffect active = activate(*effect, 0, start);
         const double rad_of[] = {kRadPerDeg, kRadPerDeg * std::cos(at.h_rad), way_rad,
                                  kRadPerDeg * side};
+        const Eigen::ArrayXd decay = (-Eigen::ArrayXd::LinSpaced(8, 0, 0.07) / start.p[1]).exp();
+        const double at_truth[] = {0, 1, decay.mean()};  // in the end, on arrival, on average
         Eigen::VectorXd reading_V(8);
         for (Eigen::Index m = 0; m < 8; ++m) {
           HeadGeometry head{at.delta_rad, at.h_rad};
           head.*angle += start.p[0] * rad_of[static_cast<int>(by)] *
-                         (std::exp(-0.01 * static_cast<double>(m) / start.p[1]) - start.p[2]);
+                         (decay(m) - at_truth[static_cast<int>(start.p[2])]);
           reading_V(m) = twelve().twelve[1].head<3>().dot(specific_force_g(head, log.gamma));
         }
         const EnlargedParameters with = with_effect(twelve(), active);

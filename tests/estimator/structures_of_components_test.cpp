@@ -35,6 +35,13 @@ TEST(Structure, AnAmplifierThatChangesItsRangeHasAnotherGainBeyond) {
 }
 
 // As a polynomial of degree 12 and a wave.
+TEST(Structure, WhatTouchesBeyondAValueOfAnotherComponentIsAStepOfTheScale) {
+  SyntheticOptions options;
+  options.delta_step_deg = 10;
+  options.more_V[0] = [](const auto& a_g, double) { return a_g[1] > 0.3 ? 4e-4 * a_g[0] : 0; };
+  expect_only_structure(options, {"a_y", "scale", "step"});
+}
+
 TEST(Structure, ASeamBetweenTwoSegmentsIsOne) {
   SyntheticOptions options;
   options.delta_step_deg = 10;

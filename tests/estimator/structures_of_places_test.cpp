@@ -58,6 +58,21 @@ TEST(Structure, AMagnetBesideTheHeadIsASpot) {
   EXPECT_NEAR(parameter(found, "other_middle").value, 38 * kDegree, 4 * kDegree);
 }
 
+// As products of the column with components, and periodic errors of delta.
+TEST(Structure, LightThatFallsOnOneSideGoesByItsColumnThere) {
+  SyntheticOptions options = grid_of_the_rig();
+  const auto light = [](double t_s) { return 500 + 300 * std::sin(t_s / 70); };
+  options.more_V[1] = [=](const auto& a_g, double t_s) {
+    const double turned_rad = (delta_deg_of(a_g) - 67) * kDegree;
+    return 1.2e-6 * light(t_s) * std::max(0.0, std::cos(turned_rad)) *
+           std::cos(h_deg_of(a_g) * kDegree);
+  };
+  const UnlistedStructure found =
+      expect_only_structure(with_column(options, "lux", light),
+                            {"lux", "bias", "straight line, on one side of the turn"});
+  EXPECT_NEAR(parameter(found, "middle").value, 67 * kDegree, 2 * kDegree);
+}
+
 // From the last pose on the index had slipped.
 TEST(Findings, ALastPoseThatIsOffIsAPoseAtAWrongAngle) {
   SyntheticOptions options;

@@ -144,6 +144,21 @@ TEST(Structure, ACableThatWindsUpGoesByTheSumOfTheTurns) {
                 "polynomial of degree 1 in the sum of the turns of delta, added to delta"});
 }
 
+// As the past of the cosine of h, lines in time and harmonics.
+TEST(Structure, ATiltThatCreepsAfterItsMovesGoesByTheirFadingSum) {
+  SyntheticOptions options = fine_turns_at_random();
+  options.h_error_deg = AtEveryPose(
+      [creep_deg = 0.0, at_deg = 0.0, last_s = 0.0](double, double h_deg, double t_s) mutable {
+        creep_deg *= std::exp(-(t_s - last_s) / 15);
+        creep_deg += 6e-3 * std::abs(h_deg - at_deg);
+        at_deg = h_deg;
+        last_s = t_s;
+        return creep_deg;
+      });
+  expect_only_structure(options, {"previous_pose", "geometry",
+                                  "straight line in the fading sum of the turns of h, added to h"});
+}
+
 TEST(Structure, AnArmThatKeepsItsBendGoesByThePastOfTheWeight) {
   SyntheticOptions options = fine_turns_at_random();
   options.h_error_deg =
