@@ -309,7 +309,7 @@ Driver ends_of_pauses(const VisitLog& log) {
   const double typical_s = way_s.empty() ? 0 : median(way_s);
   const double typical_pace_s = pace_s.empty() ? 0 : median(pace_s);
   return {"t_s", "pauses", for_all_axes(log, [&](std::size_t k) {
-            if (k == 0) return 0.0;
+            if (k == 0 || !(typical_s > 0)) return 0.0;
             const double typical = std::max(typical_s, typical_pace_s * way_rad[k - 1]);
             return way_s[k - 1] > kLong * typical ? 1.0 : 0.0;
           })};

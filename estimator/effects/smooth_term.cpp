@@ -71,7 +71,8 @@ Driver turns_added_up(const VisitLog& log, bool forwards) {
   driver.reference = 0;
   double sum_rad = 0;
   for (std::size_t k = 0; k < log.visits.size(); ++k) {
-    const double turn_rad = k > 0 ? shorter_turn_rad(log.visits[k - 1], log.visits[k]) : 0;
+    const Visit* before = log.before(k);
+    const double turn_rad = before ? shorter_turn_rad(*before, log.visits[k]) : 0;
     const bool is_half = std::abs(std::abs(turn_rad) - effect::kTurn_rad / 2) < kNearly_rad;
     sum_rad += is_half ? std::copysign(turn_rad, forwards ? 1 : -1) : turn_rad;
     for (auto& values : driver.value) values.push_back(sum_rad);

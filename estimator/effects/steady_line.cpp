@@ -80,6 +80,7 @@ class LineOfDriver final : public SmoothTerm {
     auto [low, high] = std::pair(*std::min_element(value.begin(), value.end()),
                                  *std::max_element(value.begin(), value.end()));
     if (!line || !line->steady || !(high > low)) return {};
+    if (by_ == StrengthBy::square && driver_->fewest_values < 3) return {};
     if (by_ == StrengthBy::size) {
       if (!(low < 0 && high > 0)) return {};  // of one sign it is a straight line
       high = std::max(-low, high);
