@@ -366,18 +366,24 @@ std::vector<std::size_t> special_cases(const CandidateResponses& responses, cons
   Eigen::MatrixXd taken(group.means.rows(), twelve + whole.count);
   taken << fit.whitened_jacobian.block(group.first_row, 0, group.means.rows(), twelve),
       group.means.middleCols(whole.first, whole.count);
-  const auto squares_beside = [&](const Eigen::MatrixXd& basis) -> Eigen::RowVectorXd {
-    return (group.means - basis * (basis.transpose() * group.means)).colwise().squaredNorm();
+  const Eigen::MatrixXd both = orthonormal_basis(taken);
+  const Eigen::MatrixXd twelve_alone = orthonormal_basis(taken.leftCols(twelve));
+  const auto square_beside = [](const Eigen::MatrixXd& basis, const auto& means) {
+    return (means - basis * (basis.transpose() * means)).squaredNorm();
   };
-  const Eigen::RowVectorXd beside_both = squares_beside(orthonormal_basis(taken));
-  const Eigen::RowVectorXd beside_twelve =
-      squares_beside(orthonormal_basis(taken.leftCols(twelve)));
+  // A difference of squares does for most, though not to tell how little is left.
+  const Eigen::RowVectorXd squares = group.means.colwise().squaredNorm();
+  const Eigen::RowVectorXd left =
+      squares - (both.transpose() * group.means).colwise().squaredNorm();
   std::vector<std::size_t> found;
   for (std::size_t c = 0; c < responses.place.size(); ++c) {
-    const CandidateResponses::Place& part = responses.place[c];
-    if (c == general || part.group != whole.group) continue;
-    if (beside_both.segment(part.first, part.count).sum() <
-        kLeft * kLeft * beside_twelve.segment(part.first, part.count).sum())
+    const auto& [of_group, first, count] = responses.place[c];
+    if (c == general || of_group != whole.group) continue;
+    constexpr double kRounding = 1e-10;
+    if (left.segment(first, count).sum() > kRounding * squares.segment(first, count).sum())
+      continue;
+    const auto means = group.means.middleCols(first, count);
+    if (square_beside(both, means) < kLeft * kLeft * square_beside(twelve_alone, means))
       found.push_back(c);
   }
   return found;
