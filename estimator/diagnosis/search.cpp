@@ -268,8 +268,7 @@ class Search {
     const Candidate& won = list_.candidates[winner->candidate];
     const double p = model_.p_of(won, winner_log_p);
     if (p > model_.false_alarm(won)) return false;
-    if (!model_.noise_is_own() &&
-        !stands_beside_slow_noise(won, with_winner, gains.dof(winner->candidate)))
+    if (!model_.noise_is_own() && !stands_beside_slow_noise(won, with_winner))
       return model_.take_own_noise() && add_one();
     if (!won.has_name() && add_special_case(winner->candidate, gains, first_order)) return true;
     return model_.add({winner->candidate, p, with_winner});
@@ -277,18 +276,10 @@ class Search {
 
   /// Whether the readings are clearly likelier with the newcomer where it is slow and what it does
   /// may as well be slow noise, of which noise that was estimated beside more has too little.
-  bool stands_beside_slow_noise(const Candidate& newcomer, const EnlargedParameters& with,
-                                int dof) const {
-    if (newcomer.effect->subject() == Subject::head ||
-        !is_slow(input_, with, with.effects.size() - 1, any_course_of_time(input_.log)))
-      return true;
-    const Stage& stage = model_.stage();
-    const auto deviance = [&](const EnlargedParameters& parameters) {
-      return deviance_of_axis(input_, parameters, newcomer.axis, stage);
-    };
-    const double gain = deviance(stage.fit.parameters) - deviance(with);
-    return model_.p_of(newcomer, log_chi_squared_tail(std::max(0.0, gain), dof)) <=
-           model_.false_alarm(newcomer);
+  bool stands_beside_slow_noise(const Candidate& newcomer, const EnlargedParameters& with) const {
+    return !model_.may_be_slow_noise(newcomer, with) ||
+           model_.p_in_own_noise(newcomer, with, model_.stage().fit.parameters) <=
+               model_.false_alarm(newcomer);
   }
 
   /// Where a term without a name holds one with a name as a special case that does nearly as much,

@@ -9,6 +9,7 @@
 
 #include "estimator/diagnosis/residual_test.h"
 #include "estimator/diagnosis/screening.h"
+#include "estimator/diagnosis/slow_look.h"
 #include "estimator/fit/rounding.h"
 #include "estimator/noise/chi_squared.h"
 #include "estimator/parallel_for.h"
@@ -369,15 +370,44 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry&
 
 bool SearchModel::exchange(const std::vector<std::size_t>& effects,
                            const std::vector<Entry>& with) {
+  std::vector<double> p_values;
+  for (const Entry& newcomer : with) p_values.push_back(newcomer.p);
+  // The noise beside what it takes the place of was estimated as if nothing slow were noise. It is
+  // no surer than the readings say with noise of its own, or than that was.
+  if (!effects.empty() && with.size() == 1) {
+    const auto& [candidate, p, parameters] = with.front();
+    const Candidate& newcomer = list().candidates[candidate];
+    const EnlargedFit without = fit_without(effects);
+    if (without.determined && may_be_slow_noise(newcomer, parameters)) {
+      double p_before = 0;
+      for (const std::size_t k : effects) p_before = std::max(p_before, p_values_[k]);
+      const double p_own = p_in_own_noise(newcomer, parameters, without.parameters);
+      p_values.front() = std::max(p, std::min(p_own, p_before));
+    }
+  }
   if (!adopt(with.back().parameters)) return false;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k) forget(*k);
-  for (const Entry& newcomer : with) {
-    chosen_.push_back(newcomer.candidate);
-    p_values_.push_back(newcomer.p);
-  }
+  for (const Entry& newcomer : with) chosen_.push_back(newcomer.candidate);
+  p_values_.insert(p_values_.end(), p_values.begin(), p_values.end());
   look_closer();
   leave_ties_open();
   return true;
+}
+
+bool SearchModel::may_be_slow_noise(const Candidate& newcomer,
+                                    const EnlargedParameters& with) const {
+  return newcomer.effect->subject() != Subject::head &&
+         is_slow(input(), with, with.effects.size() - 1, any_course_of_time(input().log));
+}
+
+double SearchModel::p_in_own_noise(const Candidate& newcomer, const EnlargedParameters& with,
+                                   const EnlargedParameters& without) const {
+  const auto deviance = [&](const EnlargedParameters& parameters) {
+    return deviance_of_axis(input(), parameters, newcomer.axis, stage_);
+  };
+  const double gain = deviance(without) - deviance(with);
+  const auto dof = std::max<Eigen::Index>(1, with.effects.back().free_count());
+  return p_of(newcomer, log_chi_squared_tail(std::max(0.0, gain), static_cast<double>(dof)));
 }
 
 double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without,

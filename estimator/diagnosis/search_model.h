@@ -91,6 +91,12 @@ class SearchModel {
   bool exchange(const std::vector<std::size_t>& effects, const Entry& with);
   /// With several, of which the last one's model holds all.
   bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
+  /// Whether what a newcomer, the last effect of a model, does may as well be slow noise.
+  bool may_be_slow_noise(const Candidate& newcomer, const EnlargedParameters& with) const;
+  /// Its p-value by the likelihood of the model with it and of one without, each with the noise
+  /// that suits it.
+  double p_in_own_noise(const Candidate& newcomer, const EnlargedParameters& with,
+                        const EnlargedParameters& without) const;
   /// Goes on without some effects (ascending), which are not looked for again; false if that cannot
   /// be.
   bool drop(const std::vector<std::size_t>& effects);
