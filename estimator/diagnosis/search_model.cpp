@@ -374,16 +374,16 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects,
   for (const Entry& newcomer : with) p_values.push_back(newcomer.p);
   // The noise beside what it takes the place of was estimated as if nothing slow were noise. It is
   // no surer than the readings say with noise of its own, or than that was.
-  if (!effects.empty() && with.size() == 1) {
-    const auto& [candidate, p, parameters] = with.front();
-    const Candidate& newcomer = list().candidates[candidate];
+  double p_before = 0;
+  for (const std::size_t k : effects) p_before = std::max(p_before, p_values_[k]);
+  if (with.size() == 1 && with.front().p < p_before) {
+    const Candidate& newcomer = list().candidates[with.front().candidate];
+    const EnlargedParameters& parameters = with.front().parameters;
     const EnlargedFit without = fit_without(effects);
-    if (without.determined && may_be_slow_noise(newcomer, parameters)) {
-      double p_before = 0;
-      for (const std::size_t k : effects) p_before = std::max(p_before, p_values_[k]);
-      const double p_own = p_in_own_noise(newcomer, parameters, without.parameters);
-      p_values.front() = std::max(p, std::min(p_own, p_before));
-    }
+    if (without.determined && may_be_slow_noise(newcomer, parameters))
+      p_values.front() =
+          std::max(p_values.front(),
+                   std::min(p_before, p_in_own_noise(newcomer, parameters, without.parameters)));
   }
   if (!adopt(with.back().parameters)) return false;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k) forget(*k);

@@ -277,12 +277,12 @@ class Sector final : public DrivenTerm {
   std::vector<Hypothesis> hypotheses(const VisitLog&, std::size_t) const override {
     const auto [low, high] = range();
     std::vector<Hypothesis> starts;
-    // So that both edges come within reach of closer().
-    constexpr double kStep_rad = 15 * kRadPerDeg;
+    // So that both edges come within reach of closer(); nearly so for a scale, which has rivals.
+    const double step_rad = (form() == TermForm::scale ? 30 : 15) * kRadPerDeg;
     for (const double width_rad : {0.7, 1.2, 2.0, 2.8}) {
-      const auto steps = static_cast<int>(std::ceil((high - low) / kStep_rad));
+      const auto steps = static_cast<int>(std::ceil((high - low) / step_rad));
       for (int k = 0; k < steps; ++k)
-        starts.push_back({{low + k * kStep_rad, width_rad, target().typical_size()}});
+        starts.push_back({{low + k * step_rad, width_rad, target().typical_size()}});
     }
     return starts;
   }

@@ -294,10 +294,8 @@ class TermList {
     add_polynomials_of_others(angle, {2, 3});
     for (const Target& target : {kDelta, kH}) add(one_position(angle, target));
     for (const Target& target : {kDelta, kH}) add(thrown(angle, target));
-    for (const Target& target : {kBias, kScale, kDelta, kH}) {
-      add(bell(angle, target));
-      add(sector(angle, target));
-    }
+    for (const Target& target : {kBias, kDelta, kH}) add(bell(angle, target));
+    for (const Target& target : {kBias, kScale, kDelta, kH}) add(sector(angle, target));
     for (const Target& target : {kRoll, kSkew}) add_polynomials(angle, target, {1, 2});
     for (const Target& target : {kBias, kDelta, kH, kRoll}) add(half_wave(angle, target));
   }
