@@ -371,6 +371,7 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry&
 bool SearchModel::exchange(const std::vector<std::size_t>& effects,
                            const std::vector<Entry>& with) {
   std::vector<double> p_values;
+  p_values.reserve(with.size());
   for (const Entry& newcomer : with) p_values.push_back(newcomer.p);
   // The noise beside what it takes the place of was estimated as if nothing slow were noise. It is
   // no surer than the readings say with noise of its own, or than that was.
