@@ -268,7 +268,8 @@ class Search {
     const Candidate& won = list_.candidates[winner->candidate];
     const double p = model_.p_of(won, winner_log_p);
     if (p > model_.false_alarm(won)) return false;
-    if (!model_.noise_is_own() && !stands_beside_slow_noise(won, with_winner))
+    if (!model_.noise_is_own() &&
+        !stands_beside_slow_noise(won, with_winner, gains.dof(winner->candidate)))
       return model_.take_own_noise() && add_one();
     if (!won.has_name() && add_special_case(winner->candidate, gains, first_order)) return true;
     return model_.add({winner->candidate, p, with_winner});
@@ -276,10 +277,13 @@ class Search {
 
   /// Whether the readings are clearly likelier with the newcomer where it is slow and what it does
   /// may as well be slow noise, of which noise that was estimated beside more has too little.
-  bool stands_beside_slow_noise(const Candidate& newcomer, const EnlargedParameters& with) const {
-    return !model_.may_be_slow_noise(newcomer, with) ||
-           model_.p_in_own_noise(newcomer, with, model_.stage().fit.parameters) <=
-               model_.false_alarm(newcomer);
+  bool stands_beside_slow_noise(const Candidate& newcomer, const EnlargedParameters& with,
+                                int dof) const {
+    if (!may_be_slow_noise(input_, with)) return true;
+    const Stage& stage = model_.stage();
+    const double log_p =
+        log_p_in_own_noise(input_, with, stage.fit.parameters, newcomer.axis, dof, stage);
+    return model_.p_of(newcomer, log_p) <= model_.false_alarm(newcomer);
   }
 
   /// Where a term without a name holds one with a name as a special case that does nearly as much,

@@ -370,45 +370,31 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry&
 
 bool SearchModel::exchange(const std::vector<std::size_t>& effects,
                            const std::vector<Entry>& with) {
-  std::vector<double> p_values;
-  p_values.reserve(with.size());
-  for (const Entry& newcomer : with) p_values.push_back(newcomer.p);
-  // The noise beside what it takes the place of was estimated as if nothing slow were noise. It is
-  // no surer than the readings say with noise of its own, or than that was.
-  double p_before = 0;
-  for (const std::size_t k : effects) p_before = std::max(p_before, p_values_[k]);
-  if (with.size() == 1 && with.front().p < p_before) {
-    const Candidate& newcomer = list().candidates[with.front().candidate];
-    const EnlargedParameters& parameters = with.front().parameters;
-    const EnlargedFit without = fit_without(effects);
-    if (without.determined && may_be_slow_noise(newcomer, parameters))
-      p_values.front() =
-          std::max(p_values.front(),
-                   std::min(p_before, p_in_own_noise(newcomer, parameters, without.parameters)));
-  }
+  const bool one = with.size() == 1;
+  const double p_of_one = one ? p_in_place_of(effects, with.front()) : 1;
   if (!adopt(with.back().parameters)) return false;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k) forget(*k);
-  for (const Entry& newcomer : with) chosen_.push_back(newcomer.candidate);
-  p_values_.insert(p_values_.end(), p_values.begin(), p_values.end());
+  for (const Entry& newcomer : with) {
+    chosen_.push_back(newcomer.candidate);
+    p_values_.push_back(one ? p_of_one : newcomer.p);
+  }
   look_closer();
   leave_ties_open();
   return true;
 }
 
-bool SearchModel::may_be_slow_noise(const Candidate& newcomer,
-                                    const EnlargedParameters& with) const {
-  return newcomer.effect->subject() != Subject::head &&
-         is_slow(input(), with, with.effects.size() - 1, any_course_of_time(input().log));
-}
-
-double SearchModel::p_in_own_noise(const Candidate& newcomer, const EnlargedParameters& with,
-                                   const EnlargedParameters& without) const {
-  const auto deviance = [&](const EnlargedParameters& parameters) {
-    return deviance_of_axis(input(), parameters, newcomer.axis, stage_);
-  };
-  const double gain = deviance(without) - deviance(with);
-  const auto dof = std::max<Eigen::Index>(1, with.effects.back().free_count());
-  return p_of(newcomer, log_chi_squared_tail(std::max(0.0, gain), static_cast<double>(dof)));
+double SearchModel::p_in_place_of(const std::vector<std::size_t>& effects,
+                                  const Entry& newcomer) const {
+  double p_before = 0;
+  for (const std::size_t k : effects) p_before = std::max(p_before, p_values_[k]);
+  if (newcomer.p >= p_before || !may_be_slow_noise(input(), newcomer.parameters)) return newcomer.p;
+  const EnlargedFit without = fit_without(effects);
+  if (!without.determined) return newcomer.p;
+  const Candidate& candidate = list().candidates[newcomer.candidate];
+  const auto free = std::max<Eigen::Index>(1, newcomer.parameters.effects.back().free_count());
+  const double log_p = log_p_in_own_noise(input(), newcomer.parameters, without.parameters,
+                                          candidate.axis, static_cast<int>(free), stage_);
+  return std::max(newcomer.p, std::min(p_before, p_of(candidate, log_p)));
 }
 
 double SearchModel::p_of_removal(std::size_t effect, const EnlargedFit& without,

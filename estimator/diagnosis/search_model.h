@@ -91,12 +91,6 @@ class SearchModel {
   bool exchange(const std::vector<std::size_t>& effects, const Entry& with);
   /// With several, of which the last one's model holds all.
   bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
-  /// Whether what a newcomer, the last effect of a model, does may as well be slow noise.
-  bool may_be_slow_noise(const Candidate& newcomer, const EnlargedParameters& with) const;
-  /// Its p-value by the likelihood of the model with it and of one without, each with the noise
-  /// that suits it.
-  double p_in_own_noise(const Candidate& newcomer, const EnlargedParameters& with,
-                        const EnlargedParameters& without) const;
   /// Goes on without some effects (ascending), which are not looked for again; false if that cannot
   /// be.
   bool drop(const std::vector<std::size_t>& effects);
@@ -118,6 +112,10 @@ class SearchModel {
   void look_closer();
   void leave_ties_open();
   void forget(std::size_t effect);
+  /// The p-value of what takes the place of some effects. The noise beside those was estimated as
+  /// if nothing slow were noise: a slow newcomer is no surer than the readings say with noise of
+  /// its own, or than those were.
+  double p_in_place_of(const std::vector<std::size_t>& effects, const Entry& newcomer) const;
   bool drop(const std::vector<std::size_t>& effects, const EnlargedFit& without);
   /// Of its free parameters, at least one.
   int dof_of(std::size_t effect) const;

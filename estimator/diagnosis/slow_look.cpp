@@ -134,6 +134,19 @@ bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::siz
   return is_within(with_V[axis] - without_V[axis], orthonormal_basis(beside));
 }
 
+bool may_be_slow_noise(const SearchInput& input, const EnlargedParameters& model) {
+  return model.effects.back().effect->subject() != Subject::head &&
+         is_slow(input, model, model.effects.size() - 1, any_course_of_time(input.log));
+}
+
+double log_p_in_own_noise(const SearchInput& input, const EnlargedParameters& with,
+                          const EnlargedParameters& without, std::size_t axis, int dof,
+                          const Stage& stage) {
+  const double gain =
+      deviance_of_axis(input, without, axis, stage) - deviance_of_axis(input, with, axis, stage);
+  return log_chi_squared_tail(std::max(0.0, gain), dof);
+}
+
 bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis) {
   constexpr double kOfFast = 0.3;  // variances
   const Eigen::VectorXd& power = stage.noise[axis].power;

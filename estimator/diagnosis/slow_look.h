@@ -43,6 +43,16 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
 bool is_slow(const SearchInput& input, const EnlargedParameters& model, std::size_t effect,
              const Eigen::MatrixXd& beside);
 
+/// The same of the last one, whatever it acts on, and of any course of time.
+bool may_be_slow_noise(const SearchInput& input, const EnlargedParameters& model);
+
+/// ln of the p-value of one more effect, of `dof` free parameters, by the likelihood of the
+/// readings of an axis with it and without, each with the noise that suits it; all else as in
+/// `stage`.
+double log_p_in_own_noise(const SearchInput& input, const EnlargedParameters& with,
+                          const EnlargedParameters& without, std::size_t axis, int dof,
+                          const Stage& stage);
+
 /// Whether there is slow noise in which an effect could hide.
 bool has_slow_noise(const SearchInput& input, const Stage& stage, std::size_t axis);
 

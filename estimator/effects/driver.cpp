@@ -51,6 +51,11 @@ double turn_rad(const VisitLog& log, std::size_t visit) {
   return shorter_turn_rad(*before, log.visits[visit]);
 }
 
+/// Between the dwells of two visits.
+double time_between_s(const Visit& from, const Visit& to) {
+  return to.t_arrival_s - from.t_arrival_s - from.duration_s();
+}
+
 // Slope between the neighbours of a visit, per hour.
 std::vector<double> rate_per_h(const VisitLog& log, const std::vector<double>& value) {
   std::vector<double> rate(value.size());
@@ -231,7 +236,7 @@ std::vector<Driver> sizes_of_changes(const VisitLog& log) {
   });
   const auto way_s = for_all_axes(log, [&](std::size_t k) {
     const Visit* before = log.before(k);
-    return before ? log.visits[k].t_arrival_s - before->t_arrival_s - before->duration_s() : 0;
+    return before ? time_between_s(*before, log.visits[k]) : 0;
   });
   std::vector<Driver> drivers = {
       {"previous_pose", "size of the change of a_i since", std::move(size_g)},
@@ -296,12 +301,26 @@ std::vector<Driver> lengths_of_ways(const VisitLog& log) {
           {"previous_pose", "turns of h", for_all_axes(log, of_h)}};
 }
 
+Driver turns_added_up(const VisitLog& log, bool forwards) {
+  constexpr double kNearly_rad = 1e-6;
+  double sum_rad = 0;
+  const auto added_up = [&](std::size_t k) {
+    const double turned_rad = turn_rad(log, k);
+    const bool is_half = std::abs(std::abs(turned_rad) - effect::kTurn_rad / 2) < kNearly_rad;
+    return sum_rad += is_half ? std::copysign(turned_rad, forwards ? 1 : -1) : turned_rad;
+  };
+  Driver driver{"previous_pose", "sum of the turns of delta", for_all_axes(log, added_up)};
+  if (!forwards) driver.past += ", half turns backwards";
+  driver.reference = 0;
+  return driver;
+}
+
 Driver ends_of_pauses(const VisitLog& log) {
   constexpr double kLong = 4;  // times the median
   std::vector<double> way_s, way_rad, pace_s;
   for (std::size_t k = 1; k < log.visits.size(); ++k) {
     const Visit &from = log.visits[k - 1], &to = log.visits[k];
-    way_s.push_back(to.t_arrival_s - from.t_arrival_s - from.duration_s());
+    way_s.push_back(time_between_s(from, to));
     way_rad.push_back(
         std::max(std::abs(commanded_turn_rad(from, to)), std::abs(to.h_rad - from.h_rad)));
     if (way_rad.back() > 0) pace_s.push_back(way_s.back() / way_rad.back());

@@ -57,6 +57,10 @@ std::string recorded_column(const std::string& driver);
 /// change.
 std::vector<Driver> instantaneous_drivers(const VisitLog& log);
 
+/// What δ went since the first pose, turn upon turn, always the shorter way round; half turns
+/// forwards or backwards, which is for the controller to say.
+Driver turns_added_up(const VisitLog& log, bool forwards);
+
 /// 1 at visits before which several times as long passed as such ways take, else 0.
 Driver ends_of_pauses(const VisitLog& log);
 

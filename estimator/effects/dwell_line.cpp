@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "estimator/effects/effect.h"
+#include "estimator/parallel_for.h"
 
 namespace plumbline {
 namespace {
@@ -349,22 +350,25 @@ std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::siz
   return line_in_courses(courses_of(set, axis));
 }
 
-std::optional<DwellLine> line_of_all(const MeasurementSet& set,
-                                     const PerAxis<Eigen::VectorXd>& seen) {
-  std::optional<Dwells> sum;
+std::vector<std::optional<DwellLine>> lines_of_all(
+    const MeasurementSet& set, const std::vector<PerAxis<Eigen::VectorXd>>& seen) {
+  std::vector<std::optional<DwellLine>> lines(seen.size());
+  PerAxis<Dwells> courses;
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-    Dwells of_axis = courses_of(set, axis);
-    if (!of_axis.say_enough()) return {};
-    Eigen::Index k = 0;
-    for (std::size_t pose = 0; pose < set.poses.size(); ++pose)
-      if (set.poses[pose].count >= kFewestSamples)
-        of_axis.off_V.col(k++) *= seen[axis](static_cast<Eigen::Index>(pose));
-    if (sum)
-      sum->off_V += of_axis.off_V;
-    else
-      sum = std::move(of_axis);
+    courses[axis] = courses_of(set, axis);
+    if (!courses[axis].say_enough()) return lines;
   }
-  return line_in_courses(*sum);
+  std::vector<Eigen::Index> poses;  // of the dwells
+  for (std::size_t pose = 0; pose < set.poses.size(); ++pose)
+    if (set.poses[pose].count >= kFewestSamples) poses.push_back(static_cast<Eigen::Index>(pose));
+  parallel_for(seen.size(), [&](std::size_t k) {
+    Dwells sum = courses[0];
+    sum.off_V.setZero();
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis)
+      sum.off_V += courses[axis].off_V * seen[k][axis](poses).asDiagonal();
+    lines[k] = line_in_courses(sum);
+  });
+  return lines;
 }
 
 std::optional<DwellLine> line_between_dwells(const MeasurementSet& set,

@@ -32,11 +32,11 @@ inline double alias_hz(double f_hz, double step_s) {
 /// of few samples.
 std::optional<DwellLine> line_through_dwells(const MeasurementSet& set, std::size_t axis);
 
-/// The same for a line of an angle of the head, or of something else that the axes see as they
-/// stand to it: in the sum of the axes' courses, each times what it sees of it at the pose over the
-/// square of its noise. Of the result the amplitude means nothing.
-std::optional<DwellLine> line_of_all(const MeasurementSet& set,
-                                     const PerAxis<Eigen::VectorXd>& seen);
+/// The same for lines of what the axes see as they stand to it, an angle of the head that swings:
+/// in the sum of the axes' courses, each times what it sees of that at the pose over the square of
+/// its noise, one for each of `seen`. Of the results the amplitude means nothing.
+std::vector<std::optional<DwellLine>> lines_of_all(
+    const MeasurementSet& set, const std::vector<PerAxis<Eigen::VectorXd>>& seen);
 
 /// The same for a line so near a multiple of the sampling rate that it hardly changes within a
 /// dwell: in what the mean of each pose leaves of the 12-parameter model, V.

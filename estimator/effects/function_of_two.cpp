@@ -143,6 +143,7 @@ class LineTimesField final : public DrivenTerm {
   DriverPointer delta_, h_;
 };
 
+/// What falls on one side of the turntable, as light does, only not always as strong.
 class LineOnOneSide final : public DrivenTerm {
  public:
   LineOnOneSide(DriverPointer driver, DriverPointer delta, DriverPointer h, Target target)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <mutex>
 #include <numeric>
 #include <string>
@@ -308,25 +309,23 @@ std::vector<std::unique_ptr<SmoothTerm>> memory_terms(const VisitLog& log, doubl
     terms.push_back(towards_a_direction(of(kTilt)));
     terms.push_back(about_some_axis(of(kSeat)));
   }
-  const auto add = [&](const DriverPointer& driver, MemoryOf of, const Target& target) {
-    terms.push_back(std::make_unique<MemoryTerm>(std::make_shared<const Memory>(driver, of, log),
-                                                 target, longest_s));
+  const auto add = [&](const DriverPointer& driver, MemoryOf of,
+                       std::initializer_list<Target> targets) {
+    const auto memory = std::make_shared<const Memory>(driver, of, log);
+    for (const Target& target : targets)
+      terms.push_back(std::make_unique<MemoryTerm>(memory, target, longest_s));
   };
   for (const DriverPointer& column : columns) {
-    add(column, MemoryOf::square, kBias);
-    // What flows arrives later.
-    for (const Target& target : {kBias, kScale, kH}) add(column, MemoryOf::dead_time, target);
+    add(column, MemoryOf::square, {kBias});
+    add(column, MemoryOf::dead_time, {kBias, kScale, kH});  // what flows arrives later
   }
   // What it draws heats; where it rests, charges gather; what it warms on one side bends.
-  for (const MemoryOf of : {MemoryOf::square, MemoryOf::sign}) add(attitude, of, kBias);
-  for (Driver& other : loads_of_others(log)) add(shared(std::move(other)), MemoryOf::rest, kBias);
-  for (Driver& each : lengths_of_ways(log)) {
-    const auto ways = shared(std::move(each));
-    for (const Target& target : {kBias, kDelta, kH}) add(ways, MemoryOf::sum, target);
-  }
-  for (const Target& target : {kBias, kScale})
-    add(shared(ends_of_pauses(log)), MemoryOf::sum, target);
-  add(shared(weight_across(log)), MemoryOf::average, kH);
+  for (const MemoryOf of : {MemoryOf::square, MemoryOf::sign}) add(attitude, of, {kBias});
+  for (Driver& other : loads_of_others(log)) add(shared(std::move(other)), MemoryOf::rest, {kBias});
+  for (Driver& ways : lengths_of_ways(log))
+    add(shared(std::move(ways)), MemoryOf::sum, {kBias, kDelta, kH});
+  add(shared(ends_of_pauses(log)), MemoryOf::sum, {kBias, kScale});
+  add(shared(weight_across(log)), MemoryOf::average, {kH});
   return terms;
 }
 

@@ -62,24 +62,6 @@ Driver angle_without_return(const VisitLog& log) {
   return driver;
 }
 
-/// What δ went since the first pose, turn upon turn, always the shorter way round; half turns
-/// forwards or backwards, which is for the controller to say.
-Driver turns_added_up(const VisitLog& log, bool forwards) {
-  constexpr double kNearly_rad = 1e-6;
-  Driver driver{"previous_pose", "sum of the turns of delta", {}};
-  if (!forwards) driver.past += ", half turns backwards";
-  driver.reference = 0;
-  double sum_rad = 0;
-  for (std::size_t k = 0; k < log.visits.size(); ++k) {
-    const Visit* before = log.before(k);
-    const double turn_rad = before ? shorter_turn_rad(*before, log.visits[k]) : 0;
-    const bool is_half = std::abs(std::abs(turn_rad) - effect::kTurn_rad / 2) < kNearly_rad;
-    sum_rad += is_half ? std::copysign(turn_rad, forwards ? 1 : -1) : turn_rad;
-    for (auto& values : driver.value) values.push_back(sum_rad);
-  }
-  return driver;
-}
-
 /// An angle that follows the load as it turns with the tilt.
 std::array<Target, 2> pulled(const Target& angle) {
   Target by_cosine = angle, by_sine = angle;
@@ -404,9 +386,7 @@ class TermList {
       add(decay_in_dwell(of));
     for (const EventShape shape : {EventShape::step, EventShape::window})
       add(event_of_dwells(shape));
-    for (const auto angle : {&HeadGeometry::delta_rad, &HeadGeometry::h_rad,
-                             &HeadGeometry::roll_rad, &HeadGeometry::lift})
-      add(swinging_angle(angle));
+    for (const auto angle : kSwinging) add(swinging_angle(angle));
     for (const auto* drivers : {&columns_, &rates_, &attitude_})
       for (const DriverPointer& driver : *drivers)
         for (const StrengthBy by : {StrengthBy::value, StrengthBy::size})

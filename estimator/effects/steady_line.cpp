@@ -20,10 +20,8 @@ class SwingingAngle final : public HeadInDwell {
             effect::line_phase()};
   }
   std::vector<Hypothesis> hypotheses(const VisitLog& log, std::size_t) const override {
-    const auto& line = is_delta()                        ? log.delta_line
-                       : angle() == &HeadGeometry::h_rad ? log.h_line
-                       : is_lift()                       ? log.vertical_line
-                                                         : log.roll_line;
+    const auto at = std::find(kSwinging.begin(), kSwinging.end(), angle());
+    const auto& line = log.swinging_line.at(static_cast<std::size_t>(at - kSwinging.begin()));
     if (!line || !line->steady) return {};
     const double small = is_lift() ? effect::kSmallTerm : effect::kSmallAngle_deg;
     return {{{small, line->f_hz, effect::start_of_phase_deg(*line)}}};

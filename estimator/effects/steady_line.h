@@ -9,7 +9,7 @@
 namespace plumbline {
 
 /// An angle of the head that swings: a servo that hunts; or a base that is shaken: to and fro,
-/// which is to the triad as if it swung, or up and down. `angle`: δ, h, the base roll or the lift.
+/// which is to the triad as if it swung, or up and down. `angle`: one of kSwinging.
 std::unique_ptr<SmoothTerm> swinging_angle(double HeadGeometry::*angle);
 
 /// By what of a driver a line is as strong as it is: a straight line in it or, where it takes both

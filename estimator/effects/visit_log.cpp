@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <numeric>
 
@@ -59,14 +58,15 @@ PlainFit plain_fit(const VisitLog& log, std::size_t axis) {
   return {value, mean_V - A * value};
 }
 
-/// What an axis sees of a small turn, or of anything else in g that depends on where the head
-/// stands, at every visit, over the square of its noise.
-Eigen::VectorXd seen_of(const VisitLog& log, std::size_t axis, const Eigen::Vector4d& value,
-                        const std::function<Eigen::Vector3d(const HeadGeometry&)>& along_g) {
+/// What an axis sees at every visit when one of kSwinging is moved a little, over the square of its
+/// noise.
+Eigen::VectorXd seen_of(double HeadGeometry::*moved, const VisitLog& log, std::size_t axis,
+                        const Eigen::Vector4d& value) {
   Eigen::VectorXd seen_V(std::ssize(log.visits));
   for (Eigen::Index k = 0; k < seen_V.size(); ++k) {
     const Visit& visit = log.visits[static_cast<std::size_t>(k)];
-    seen_V(k) = value.head<3>().dot(along_g({visit.delta_rad, visit.h_rad}));
+    seen_V(k) =
+        value.head<3>().dot(slope_g_per_rad({visit.delta_rad, visit.h_rad}, moved, log.gamma));
   }
   const double variance_V2 = log.sample_sd_V[axis] * log.sample_sd_V[axis];
   return variance_V2 > 0 ? Eigen::VectorXd(seen_V / variance_V2)
@@ -164,8 +164,7 @@ Eigen::MatrixXd contrasts_of(const Visit& visit, const VisitLog& log) {
     add(phase.cos().matrix());
   };
   for (const auto& line : log.line) add_line(line);
-  for (const auto& line : {log.delta_line, log.h_line, log.roll_line, log.vertical_line})
-    add_line(line);
+  for (const auto& line : log.swinging_line) add_line(line);
   for (const auto& event : log.event) {
     if (!event) continue;
     Eigen::VectorXd course(contrasts.rows());
@@ -344,7 +343,7 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     if (std::all_of(log.codes.begin(), log.codes.end(), rounds_or_lacks_the_lowest_bit))
       for (CodeFaults& codes : log.codes) codes.stuck_bits.clear();
   }
-  PerAxis<Eigen::VectorXd> by_delta, by_h, by_roll, by_lift;
+  std::vector<PerAxis<Eigen::VectorXd>> seen(kSwinging.size());
   parallel_for(kAxisCount, [&](std::size_t i) {
     log.sample_sd_V[i] = log.input_sd_V[i] = white_scatter_V(set, i);
     if (log.adc) log.input_sd_V[i] = input_scatter_V(set, log, i);
@@ -353,27 +352,16 @@ VisitLog make_visit_log(const MeasurementSet& set, const RunDescription& descrip
     log.lowest_V[i] = *low;
     log.highest_V[i] = *high;
     const PlainFit fit = plain_fit(log, i);
-    const auto by = [&](double HeadGeometry::*angle) {
-      return seen_of(log, i, fit.value, [&](const HeadGeometry& head) {
-        return slope_g_per_rad(head, angle, log.gamma);
-      });
-    };
-    by_delta[i] = by(&HeadGeometry::delta_rad);
-    by_h[i] = by(&HeadGeometry::h_rad);
-    by_roll[i] = by(&HeadGeometry::roll_rad);
-    by_lift[i] = seen_of(log, i, fit.value, [&](const HeadGeometry& head) {
-      return specific_force_g(head, log.gamma);
-    });
+    for (std::size_t k = 0; k < kSwinging.size(); ++k)
+      seen[k][i] = seen_of(kSwinging[k], log, i, fit.value);
     log.event[i] = event_in_dwells(set, i);
     log.line[i] = stronger(line_through_dwells(set, i), line_between_dwells(set, fit.left_V));
     if (!log.line[i]) return;
     log.line_V2[i] = between_samples_V2(*log.line[i], log.visits.front().step_s);
     if (is_in_noise(*log.line[i], log.visits.front(), bands)) log.line[i].reset();
   });
-  log.delta_line = line_of_all(set, by_delta);
-  log.h_line = line_of_all(set, by_h);
-  log.roll_line = line_of_all(set, by_roll);
-  log.vertical_line = line_of_all(set, by_lift);
+  const auto lines = lines_of_all(set, seen);
+  std::copy(lines.begin(), lines.end(), log.swinging_line.begin());
   for (const Visit& visit : log.visits)
     if (!log.contrasts.contains(visit.count))
       log.contrasts.emplace(visit.count, contrasts_of(visit, log));

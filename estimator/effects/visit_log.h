@@ -39,6 +39,11 @@ struct Visit {
 
 inline constexpr const char* kTemperatureColumn = "temp_C";
 
+/// What may swing: angles of the head; a base that is shaken to and fro is to the triad one that
+/// swings, one that is shaken up and down another gravity.
+inline constexpr std::array kSwinging = {&HeadGeometry::delta_rad, &HeadGeometry::h_rad,
+                                         &HeadGeometry::roll_rad, &HeadGeometry::lift};
+
 /// The visits in order and what holds for all of them.
 struct VisitLog {
   std::vector<Visit> visits;
@@ -58,9 +63,8 @@ struct VisitLog {
   std::optional<Adc> adc;
   bool goes_as_commanded = false;          ///< RunDescription's
   PerAxis<std::optional<DwellLine>> line;  ///< that runs through the dwells
-  /// As if an angle of the head or the base swung: a base that is shaken to and fro is one that
-  /// swings. And as if it were shaken up and down.
-  std::optional<DwellLine> delta_line, h_line, roll_line, vertical_line;
+  /// That all axes see as if one of kSwinging swung.
+  std::array<std::optional<DwellLine>, kSwinging.size()> swinging_line;
   PerAxis<std::optional<DwellEvent>> event;  ///< in every dwell
   /// What is looked for within a dwell beside its mean, for every number of samples that occurs:
   /// samples × dwell_contrasts(), orthonormal columns of zero sum; what a dwell cannot resolve is

@@ -8,9 +8,9 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <utility>
 
+#include "estimator/angle_units.h"
 #include "estimator/calibrate.h"
 #include "tests/estimator/synthetic_run.h"
 
@@ -45,12 +45,14 @@ inline UnlistedStructure expect_only_structure(const SyntheticOptions& options,
   return expect_only_structure(synthetic_run(7, kSixteenBits, options), expected);
 }
 
-inline constexpr double kDegree = std::numbers::pi / 180;
-
 /// Where the spindle stands, from 0° to 360°, by the specific force.
 inline double delta_deg_of(const std::array<double, 3>& a_g) {
-  const double delta_deg = std::atan2(-a_g[1], a_g[0]) / kDegree;
+  const double delta_deg = std::atan2(-a_g[1], a_g[0]) / kRadPerDeg;
   return delta_deg < -1e-6 ? delta_deg + 360 : delta_deg;
+}
+/// How far the spindle is raised, by the specific force.
+inline double h_deg_of(const std::array<double, 3>& a_g) {
+  return std::atan2(a_g[2], std::hypot(a_g[0], a_g[1])) / kRadPerDeg;
 }
 
 inline const EffectParameter& parameter(const UnlistedStructure& found, const char* name) {

@@ -76,8 +76,8 @@ SyntheticRun on_a_shaken_base(const std::array<double, 3>& shaken_g) {
   SyntheticOptions options = long_dwells();
   for (std::size_t axis = 0; axis < kAxisCount; ++axis)
     options.more_V[axis] = [=](const auto& a_g, double t_s) {
-      const double delta_rad = delta_deg_of(a_g) * kDegree;
-      const double h_rad = std::atan2(a_g[2], std::hypot(a_g[0], a_g[1]));
+      const double delta_rad = delta_deg_of(a_g) * kRadPerDeg;
+      const double h_rad = h_deg_of(a_g) * kRadPerDeg;
       const double sd = std::sin(delta_rad), cd = std::cos(delta_rad);
       const double x_b[] = {-std::sin(h_rad) * cd, std::sin(h_rad) * sd, std::cos(h_rad)};
       const double y_b[] = {-sd, -cd, 0};
@@ -102,9 +102,9 @@ TEST(Structure, ABaseThatIsShakenSwingsOrIsLifted) {
   const EffectParameter lifted = shaken({0, 0, kShaken_g}, "sine, added to gravity");
   EXPECT_NEAR(lifted.value, kShaken_g, 4 * lifted.u);
   const EffectParameter swung = shaken({kShaken_g, 0, 0}, "sine, added to h");
-  EXPECT_NEAR(swung.value * kDegree, kShaken_g, 4 * swung.u * kDegree);
+  EXPECT_NEAR(swung.value * kRadPerDeg, kShaken_g, 4 * swung.u * kRadPerDeg);
   const EffectParameter rolled = shaken({0, kShaken_g, 0}, "sine, added to the base roll");
-  EXPECT_NEAR(rolled.value * kDegree, kShaken_g, 4 * rolled.u * kDegree);
+  EXPECT_NEAR(rolled.value * kRadPerDeg, kShaken_g, 4 * rolled.u * kRadPerDeg);
 
   const Calibration askew = calibrated(on_a_shaken_base({0.8 * kShaken_g, 0.6 * kShaken_g, 0}));
   SCOPED_TRACE(askew.diagnosis.reason);

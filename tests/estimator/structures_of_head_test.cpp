@@ -15,8 +15,6 @@ namespace {
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr double kRadians = std::numbers::pi / 180;
-
 SyntheticOptions fine_turns() {
   SyntheticOptions options;
   options.delta_step_deg = 10;
@@ -43,12 +41,12 @@ TEST(Structure, ABaseTiltsTowardsADirectionOfItsOwn) {
   constexpr double kTilt_deg = 0.8, kDirection_deg = 30;
   SyntheticOptions options = fine_turns();
   options.random_order = true;
-  const auto slipped = [](double t_s) { return t_s < 280 ? 0 : kTilt_deg * kRadians; };
+  const auto slipped = [](double t_s) { return t_s < 280 ? 0 : kTilt_deg * kRadPerDeg; };
   options.base_tilt_rad = [=](double t_s) {
-    return slipped(t_s) * std::cos(kDirection_deg * kRadians);
+    return slipped(t_s) * std::cos(kDirection_deg * kRadPerDeg);
   };
   options.base_roll_rad = [=](double t_s) {
-    return slipped(t_s) * std::sin(kDirection_deg * kRadians);
+    return slipped(t_s) * std::sin(kDirection_deg * kRadPerDeg);
   };
   const UnlistedStructure found =
       expect_only_structure(options, {"t_s", "geometry", "step, added to the tilt of the base"});
@@ -70,7 +68,7 @@ TEST(Structure, ATiltAlmostAlongAnAxisOfTheBaseIsOne) {
   const UnlistedStructure found = expect_only_structure(
       data, {"temp_C", "geometry", "polynomial of degree 1, added to the tilt of the base"});
   const EffectParameter& direction = parameter(found, "direction");
-  EXPECT_NEAR(direction.value, std::atan2(0.004, 0.02) / kRadians, 4 * direction.u);
+  EXPECT_NEAR(direction.value, std::atan2(0.004, 0.02) / kRadPerDeg, 4 * direction.u);
 }
 
 // As polynomials and waves of the time.
@@ -101,7 +99,7 @@ TEST(Structure, AnArmThatWarmsLateTiltsWithTheAverageOfThePast) {
 TEST(Structure, ALoadThatIsThrownAcrossAPlayIsOne) {
   SyntheticOptions options = fine_turns();
   options.delta_error_deg = [](double delta_deg, double) {
-    return 0.6 * std::tanh(8 * std::sin((delta_deg - 33) * kRadians));
+    return 0.6 * std::tanh(8 * std::sin((delta_deg - 33) * kRadPerDeg));
   };
   expect_only_structure(options,
                         {"delta_deg", "geometry", "thrown from side to side, added to delta"});
@@ -112,8 +110,8 @@ TEST(Structure, ARunoutThatGrowsWithTheTiltIsOne) {
   SyntheticOptions options = fine_turns();
   options.h_step_deg = 10;
   options.delta_error_deg = [](double delta_deg, double h_deg) {
-    return 0.8 * std::cos(3 * (delta_deg - 20) * kRadians) *
-           std::pow(std::sin(h_deg * kRadians), 2);
+    return 0.8 * std::cos(3 * (delta_deg - 20) * kRadPerDeg) *
+           std::pow(std::sin(h_deg * kRadPerDeg), 2);
   };
   expect_only_structure(
       options, {"h_deg", "geometry", "parabola, times a harmonic of delta_deg, added to delta"});
@@ -134,7 +132,7 @@ TEST(Structure, AServoThatHuntsSwingsTheSpindle) {
   const UnlistedStructure found =
       expect_only_structure(options, {"t_in_pose", "geometry", "sine, added to delta"});
   const EffectParameter &size = parameter(found, "amplitude"), &f = parameter(found, "f");
-  EXPECT_NEAR(size.value, kSwing_rad / kRadians, std::max(4 * size.u, 0.03 * size.value));
+  EXPECT_NEAR(size.value, kSwing_rad / kRadPerDeg, std::max(4 * size.u, 0.03 * size.value));
   EXPECT_NEAR(f.value, kFrequency_hz, 4 * f.u);
 }
 
@@ -172,7 +170,7 @@ TEST(Structure, APlayThatTheLoadTakesUpTurnsWithTheSpindle) {
   options.delta_error_deg = [last_deg = 0.0, up = 1.0](double delta_deg, double) mutable {
     if (delta_deg != last_deg) up = delta_deg > last_deg ? 1 : -1;
     last_deg = delta_deg;
-    return 0.4 * up * std::sin(delta_deg * kRadians);
+    return 0.4 * up * std::sin(delta_deg * kRadPerDeg);
   };
   expect_only_structure(options, {"previous_pose", "geometry",
                                   "straight line, times a harmonic of delta_deg in the direction "
@@ -216,7 +214,7 @@ TEST(Structure, APlayThatTheLoadCrossesGoesByTheLoad) {
   SyntheticOptions options = fine_turns();
   options.random_order = true;
   options.delta_error_deg = [side = 1.0](double delta_deg, double h_deg) mutable {
-    const double load = -std::sin(delta_deg * kRadians) * std::cos(h_deg * kRadians);
+    const double load = -std::sin(delta_deg * kRadPerDeg) * std::cos(h_deg * kRadPerDeg);
     if (load > 0.33) side = 1;
     if (load < -0.33) side = -1;
     return 0.3 * side;
@@ -248,7 +246,7 @@ TEST(Structure, ADriveThatLagsGoesByItsLastTurn) {
 TEST(Structure, APierThatLeansToOneSideOnlyIsHalfAWave) {
   SyntheticOptions options = fine_turns();
   options.roll_error_deg = [](double delta_deg, double) {
-    return 0.3 * std::max(0.0, std::sin((delta_deg - 40) * kRadians));
+    return 0.3 * std::max(0.0, std::sin((delta_deg - 40) * kRadPerDeg));
   };
   expect_only_structure(options, {"delta_deg", "geometry", "half a wave, added to the base roll"});
 }
@@ -258,11 +256,11 @@ TEST(Structure, AFrameThatTwistsWithTheTiltIsNoAliasOfItself) {
   SyntheticOptions options = fine_turns();
   options.h_step_deg = 10;
   options.roll_error_deg = [](double, double h_deg) {
-    return -2.2 * std::sin(3 * h_deg * kRadians);
+    return -2.2 * std::sin(3 * h_deg * kRadPerDeg);
   };
   const UnlistedStructure found =
       expect_only_structure(options, {"h_deg", "geometry", "wave, added to the base roll"});
-  EXPECT_NEAR(parameter(found, "period").value, 120 * kRadians, 5 * kRadians);
+  EXPECT_NEAR(parameter(found, "period").value, 120 * kRadPerDeg, 5 * kRadPerDeg);
 }
 
 // About no axis of the triad: as a turn of delta and a tilt.

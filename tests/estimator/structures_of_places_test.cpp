@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "tests/estimator/structure.h"
@@ -16,11 +15,6 @@ SyntheticOptions grid_of_the_rig() {
   options.delta_step_deg = 10;
   options.h_step_deg = 10;
   return options;
-}
-
-/// How far the spindle is raised, by the specific force.
-double h_deg_of(const std::array<double, 3>& a_g) {
-  return std::atan2(a_g[2], std::hypot(a_g[0], a_g[1])) / kDegree;
 }
 
 // As sectors and bells of the bias.
@@ -41,7 +35,7 @@ TEST(Structure, ACableThatPullsTightAboveATiltIsABendOfIt) {
     return 3e-5 * std::max(0.0, h_deg_of(a_g) - 50);
   };
   const UnlistedStructure found = expect_only_structure(options, {"h_deg", "bias", "bend"});
-  EXPECT_NEAR(parameter(found, "at").value, 50 * kDegree, 3 * kDegree);
+  EXPECT_NEAR(parameter(found, "at").value, 50 * kRadPerDeg, 3 * kRadPerDeg);
 }
 
 // As a bell of the turn and products of harmonics.
@@ -54,8 +48,8 @@ TEST(Structure, AMagnetBesideTheHeadIsASpot) {
   };
   const UnlistedStructure found =
       expect_only_structure(options, {"delta_deg", "bias", "bell, times a bell of h_deg"});
-  EXPECT_NEAR(parameter(found, "middle").value, 63 * kDegree, 4 * kDegree);
-  EXPECT_NEAR(parameter(found, "other_middle").value, 38 * kDegree, 4 * kDegree);
+  EXPECT_NEAR(parameter(found, "middle").value, 63 * kRadPerDeg, 4 * kRadPerDeg);
+  EXPECT_NEAR(parameter(found, "other_middle").value, 38 * kRadPerDeg, 4 * kRadPerDeg);
 }
 
 // As products of the column with components, and periodic errors of delta.
@@ -63,14 +57,14 @@ TEST(Structure, LightThatFallsOnOneSideGoesByItsColumnThere) {
   SyntheticOptions options = grid_of_the_rig();
   const auto light = [](double t_s) { return 500 + 300 * std::sin(t_s / 70); };
   options.more_V[1] = [=](const auto& a_g, double t_s) {
-    const double turned_rad = (delta_deg_of(a_g) - 67) * kDegree;
+    const double turned_rad = (delta_deg_of(a_g) - 67) * kRadPerDeg;
     return 1.2e-6 * light(t_s) * std::max(0.0, std::cos(turned_rad)) *
-           std::cos(h_deg_of(a_g) * kDegree);
+           std::cos(h_deg_of(a_g) * kRadPerDeg);
   };
   const UnlistedStructure found =
       expect_only_structure(with_column(options, "lux", light),
                             {"lux", "bias", "straight line, on one side of the turn"});
-  EXPECT_NEAR(parameter(found, "middle").value, 67 * kDegree, 2 * kDegree);
+  EXPECT_NEAR(parameter(found, "middle").value, 67 * kRadPerDeg, 2 * kRadPerDeg);
 }
 
 // From the last pose on the index had slipped.

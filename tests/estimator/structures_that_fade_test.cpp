@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 
 #include "tests/estimator/structure.h"
 
@@ -163,7 +162,7 @@ TEST(Structure, AnArmThatKeepsItsBendGoesByThePastOfTheWeight) {
   SyntheticOptions options = fine_turns_at_random();
   options.h_error_deg =
       AtEveryPose([bend = PastAverage(20)](double, double h_deg, double t_s) mutable {
-        return 1.2 * bend(std::cos(h_deg * kDegree), t_s);
+        return 1.2 * bend(std::cos(h_deg * kRadPerDeg), t_s);
       });
   expect_only_structure(
       options, {"previous_pose", "geometry",
