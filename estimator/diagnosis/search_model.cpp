@@ -20,6 +20,11 @@ namespace {
 
 constexpr double kPerAmplitude = 7;  // Schwarz: ln of the number of means, about 3 · 324
 
+/// Of its free parameters, at least one.
+int dof_of(const ActiveEffect& effect) {
+  return static_cast<int>(std::max<Eigen::Index>(1, effect.free_count()));
+}
+
 /// Whether a time constant says nothing: that of what changes within the dwell is not known to be
 /// finite, that of a memory not known at all.
 bool has_no_time_constant(const VisitLog& log, const EnlargedFit& fit, std::size_t effect) {
@@ -368,15 +373,13 @@ bool SearchModel::exchange(const std::vector<std::size_t>& effects, const Entry&
   return exchange(effects, std::vector{with});
 }
 
-bool SearchModel::exchange(const std::vector<std::size_t>& effects,
-                           const std::vector<Entry>& with) {
-  const bool one = with.size() == 1;
-  const double p_of_one = one ? p_in_place_of(effects, with.front()) : 1;
+bool SearchModel::exchange(const std::vector<std::size_t>& effects, std::vector<Entry> with) {
+  if (with.size() == 1) with.front().p = p_in_place_of(effects, with.front());
   if (!adopt(with.back().parameters)) return false;
   for (auto k = effects.rbegin(); k != effects.rend(); ++k) forget(*k);
   for (const Entry& newcomer : with) {
     chosen_.push_back(newcomer.candidate);
-    p_values_.push_back(one ? p_of_one : newcomer.p);
+    p_values_.push_back(newcomer.p);
   }
   look_closer();
   leave_ties_open();
@@ -391,9 +394,9 @@ double SearchModel::p_in_place_of(const std::vector<std::size_t>& effects,
   const EnlargedFit without = fit_without(effects);
   if (!without.determined) return newcomer.p;
   const Candidate& candidate = list().candidates[newcomer.candidate];
-  const auto free = std::max<Eigen::Index>(1, newcomer.parameters.effects.back().free_count());
-  const double log_p = log_p_in_own_noise(input(), newcomer.parameters, without.parameters,
-                                          candidate.axis, static_cast<int>(free), stage_);
+  const double log_p =
+      log_p_in_own_noise(input(), newcomer.parameters, without.parameters, candidate.axis,
+                         dof_of(newcomer.parameters.effects.back()), stage_);
   return std::max(newcomer.p, std::min(p_before, p_of(candidate, log_p)));
 }
 
@@ -471,18 +474,14 @@ void SearchModel::drop_superfluous() {
   }
 }
 
-int SearchModel::dof_of(std::size_t effect) const {
-  return static_cast<int>(
-      std::max<Eigen::Index>(1, stage_.fit.parameters.effects[effect].free_count()));
-}
-
 SearchResult SearchModel::take_result() {
   SearchResult result;
   result.evidence.resize(chosen_.size());
   parallel_for(chosen_.size(), [&](std::size_t k) {
     const double lost = fit_without({k}).chi2 - stage_.fit.chi2;
-    result.evidence[k] = {candidate(k), p_values_[k],
-                          sigmas_of(log_chi_squared_tail(lost, dof_of(k)))};
+    result.evidence[k] = {
+        candidate(k), p_values_[k],
+        sigmas_of(log_chi_squared_tail(lost, dof_of(stage_.fit.parameters.effects[k])))};
   });
   responses();
   result.responses = std::move(*responses_);

@@ -90,7 +90,7 @@ class SearchModel {
   bool add(const Entry& with);
   bool exchange(const std::vector<std::size_t>& effects, const Entry& with);
   /// With several, of which the last one's model holds all.
-  bool exchange(const std::vector<std::size_t>& effects, const std::vector<Entry>& with);
+  bool exchange(const std::vector<std::size_t>& effects, std::vector<Entry> with);
   /// Goes on without some effects (ascending), which are not looked for again; false if that cannot
   /// be.
   bool drop(const std::vector<std::size_t>& effects);
@@ -117,8 +117,6 @@ class SearchModel {
   /// its own, or than those were.
   double p_in_place_of(const std::vector<std::size_t>& effects, const Entry& newcomer) const;
   bool drop(const std::vector<std::size_t>& effects, const EnlargedFit& without);
-  /// Of its free parameters, at least one.
-  int dof_of(std::size_t effect) const;
   double p_of_removal(std::size_t effect, const EnlargedFit& without, double excess = 1) const;
   /// What is left of the axes that an effect acts on, in χ² for each degree of freedom; 1 where it
   /// may be chance, or little.

@@ -234,6 +234,7 @@ class Step final : public DrivenTerm {
       const int visits = has_rivals ? 4 : 2;
       const bool clock = variable().is_clock();
       widths = {clock ? part_of_spacing() : 0.01 * (high - low)};
+      // Of a scale fewer will do: most of what it does is the same for a place near by.
       const int of_range = variable().component && form() == TermForm::scale ? 16 : 32;
       parts = clock ? static_cast<int>(variable().value[0].size()) / visits : of_range;
     }

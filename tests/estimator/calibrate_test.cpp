@@ -273,7 +273,7 @@ TEST(Calibrate, StatedUncertaintiesHoldWithNoiseOfATwentiethOfAStep) {
   options.sigma_V = 0.05 * kTwelveBits.lsb_V();
   options.samples_per_pose = 10;
   int inside = 0;
-  for (std::uint64_t seed = 100; seed < 130; ++seed) {
+  for (std::uint64_t seed = 100; seed < 160; ++seed) {
     const SyntheticRun data = synthetic_run(seed, kTwelveBits, options);
     const Calibration result = calibrated(data);
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
@@ -283,7 +283,7 @@ TEST(Calibrate, StatedUncertaintiesHoldWithNoiseOfATwentiethOfAStep) {
                   1.96 * std::sqrt(batch.covariance(j, j));
     }
   }
-  EXPECT_NEAR(inside, 342, 17);
+  EXPECT_NEAR(inside, 684, 24);
 }
 
 TEST(Calibrate, StaticRecordWithGapsIsUsedUpToThem) {

@@ -10,7 +10,7 @@
 namespace plumbline::study {
 namespace {
 
-constexpr int kUnits = 24;
+constexpr int kUnits = 40;
 constexpr std::uint64_t kFirstSeed = 1001;  // others than those of the whole study
 // One fair study in a thousand would fall outside.
 constexpr double kProbability = 0.999;
@@ -33,7 +33,7 @@ TEST_P(CoverageOfSimulatedUnits, StatedUncertaintiesHold) {
   const Interval nees = nees_interval(kUnits, kProbability);
   EXPECT_GE(coverage.mean_nees, nees.lower);
   EXPECT_LE(coverage.mean_nees, nees.upper);
-  // Twelve means of standard normal values; 4 standard deviations each.
+  // Twelve means of 40 standard normal values; 4 standard deviations each.
   EXPECT_LE(coverage.mean.cwiseAbs().maxCoeff(), 4 / std::sqrt(kUnits));
   EXPECT_DOUBLE_EQ(coverage.en_within_share, 1);
   EXPECT_DOUBLE_EQ(coverage.undecided_share, 0);
