@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace plumbline {
 
@@ -18,6 +19,12 @@ struct HeadGeometry {
 
   bool operator==(const HeadGeometry&) const = default;
 };
+
+/// All of them, the lift last.
+inline constexpr std::array kHeadAngles = {&HeadGeometry::delta_rad,  &HeadGeometry::h_rad,
+                                           &HeadGeometry::roll_rad,   &HeadGeometry::skew_rad,
+                                           &HeadGeometry::seat_x_rad, &HeadGeometry::seat_y_rad,
+                                           &HeadGeometry::lift};
 
 /// Specific force in the sensor frame, standard g. With δ and h alone this is
 /// γ·(cos h cos δ, −cos h sin δ, sin h). A lift makes γ larger by that share.

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "estimator/diagnosis/candidate_gains.h"
 #include "estimator/parallel_for.h"
 
 namespace plumbline {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/candidate_responses.h"
 
 namespace plumbline {
 

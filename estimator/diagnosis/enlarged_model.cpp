@@ -66,11 +66,14 @@ std::vector<Eigen::Vector3d> specific_forces_g(const VisitLog& log,
   return specific_forces_g(log, parameters, no_numbers(parameters));
 }
 
+Eigen::VectorXd contrasts_rad(const VisitLog& log, std::size_t visit, const AngleCourse& course) {
+  return log.contrasts.at(log.visits[visit].count).transpose() * course.course_rad;
+}
+
 HeadCourse head_course(const VisitLog& log, std::size_t visit, const HeadGeometry& head,
                        const ActiveEffect& active) {
   const AngleCourse course = active.effect->angle_course(log, visit, active.p.data());
-  return {log.contrasts.at(log.visits[visit].count).transpose() * course.course_rad,
-          slope_g_per_rad(head, course.angle, log.gamma)};
+  return {contrasts_rad(log, visit, course), slope_g_per_rad(head, course.angle, log.gamma)};
 }
 
 namespace {

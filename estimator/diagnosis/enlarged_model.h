@@ -37,6 +37,9 @@ PerAxis<Eigen::MatrixXd> predict_dwells_V(const VisitLog& log,
 /// Contrasts of one visit's dwell that one effect makes, V.
 Eigen::VectorXd dwell_contrasts_V(const TermInput& input, const ActiveEffect& active);
 
+/// Contrasts of one visit's dwell in the course of an angle, rad.
+Eigen::VectorXd contrasts_rad(const VisitLog& log, std::size_t visit, const AngleCourse& course);
+
 /// What a head effect within the dwell does to a visit, to first order in the angle.
 struct HeadCourse {
   Eigen::VectorXd contrasts_rad;    ///< of the angle

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/candidate_gains.h"
 
 namespace plumbline {
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/candidate_responses.h"
 #include "estimator/noise/noise_model.h"
 #include "estimator/noise/reml.h"
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "estimator/diagnosis/candidate_gains.h"
 #include "estimator/diagnosis/noise_stage.h"
 #include "estimator/diagnosis/search.h"
 

@@ -17,7 +17,8 @@ class BaseTilt final : public WrappedTerm {
  public:
   explicit BaseTilt(std::unique_ptr<SmoothTerm> of_h)
       : WrappedTerm(std::move(of_h)),
-        function_(term().shape().substr(0, term().shape().rfind(kTilt.words()))) {}
+        function_(term().shape().substr(0, term().shape().rfind(kTilt.words()))),
+        direction_(term().parameters().size()) {}
 
   std::vector<ParameterInfo> parameters() const override {
     constexpr double kFine_deg = 0.1;
@@ -110,13 +111,14 @@ class BaseTilt final : public WrappedTerm {
     return hypothesis;
   }
   void tilt(const HeadGeometry& by, const double* p, HeadGeometry& head) const {
-    const double direction_rad = p[term().parameters().size()] * kRadPerDeg;
+    const double direction_rad = p[direction_] * kRadPerDeg;
     const double cosine = std::cos(direction_rad), sine = std::sin(direction_rad);
     head.h_rad += by.h_rad * cosine;
     head.roll_rad += by.h_rad * sine;
   }
 
-  std::string function_;  ///< without what it acts on
+  std::string function_;   ///< without what it acts on
+  std::size_t direction_;  ///< among its parameters
 };
 
 }  // namespace

@@ -51,9 +51,7 @@ class DrivenTerm : public SmoothTerm {
                                                       : of_visit(input.axis, input.visit, p);
     return term_of_number_g(input, f);
   }
-  double term_of_number_g(const TermInput& input, double f) const override {
-    return f * target_.factor(input);
-  }
+  ForceFactor factor() const override { return target_.factor(); }
   /// What tilts the base towards a direction may do so along an axis after all.
   std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
                                  const std::vector<std::vector<double>>& p) const override {

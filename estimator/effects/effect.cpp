@@ -13,8 +13,6 @@ void Effect::displace(const VisitLog&, std::size_t, const double*, HeadGeometry&
 
 double Effect::term_g(const TermInput&, const double*) const { return 0; }
 
-double Effect::term_of_number_g(const TermInput&, double) const { return 0; }
-
 void Effect::displace_by_number(const VisitLog&, std::size_t, double, const double*,
                                 HeadGeometry&) const {}
 

@@ -70,6 +70,20 @@ struct TermInput {
   double a() const { return a_g[visit](static_cast<Eigen::Index>(axis)); }
 };
 
+/// What a number of the visit is multiplied with to become a term: the components of the specific
+/// force of axes i + first and, if any, i + second for an effect on axis i; of none, 1.
+struct ForceFactor {
+  std::optional<std::size_t> first = {}, second = {};
+
+  /// g, g² or 1.
+  double of(const Eigen::Vector3d& a_g, std::size_t axis) const {
+    const auto component_g = [&](const std::optional<std::size_t>& next) {
+      return next ? a_g(static_cast<Eigen::Index>((axis + *next) % kAxisCount)) : 1;
+    };
+    return component_g(first) * component_g(second);
+  }
+};
+
 /// How one angle of the head moves while the sensor is read.
 struct AngleCourse {
   double HeadGeometry::*angle = &HeadGeometry::delta_rad;
@@ -99,20 +113,23 @@ class Effect {
                                          const std::vector<std::vector<double>>& /*p*/) const {
     return {};
   }
-  /// Head: moves the geometry of visit `visit`.
+  /// Head: moves the geometry of visit `visit`, by angles that do not depend on what it is.
   virtual void displace(const VisitLog& log, std::size_t visit, const double* p,
                         HeadGeometry& head) const;
   /// Sensor: the bracketed term, input-referred, mean over the dwell, in g.
   virtual double term_g(const TermInput& input, const double* p) const;
-  /// Where the term (head: the angle) is a number of the visit, whatever the model is, times what
-  /// the model makes of it: that number at every visit, for whoever asks again and again. Empty
-  /// where the term is no such product.
+  /// Where the term (head: the angle) is a number of the visit, whatever the model is, times
+  /// factor(): that number at every visit, for whoever asks again and again. Empty where the term
+  /// is no such product.
   virtual std::vector<double> numbers_of_visits(const VisitLog&, std::size_t /*axis*/,
                                                 const double* /*p*/) const {
     return {};
   }
+  virtual ForceFactor factor() const { return {}; }
   /// term_g() and displace() from that number.
-  virtual double term_of_number_g(const TermInput& input, double number) const;
+  double term_of_number_g(const TermInput& input, double number) const {
+    return number * factor().of(input.a_g[input.visit], input.axis);
+  }
   virtual void displace_by_number(const VisitLog& log, std::size_t visit, double number,
                                   const double* p, HeadGeometry& head) const;
   /// Sensor: whether it may be one of this axis.

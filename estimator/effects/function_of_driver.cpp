@@ -418,12 +418,8 @@ double Target::typical_size() const {
   return form == TermForm::geometry ? effect::kSmallAngle_deg : effect::kSmallTerm;
 }
 
-double Target::factor(const TermInput& input) const {
-  const auto component_g = [&](std::size_t next) {
-    return input.a_g[input.visit](static_cast<Eigen::Index>((input.axis + next) % kAxisCount));
-  };
-  if (form != TermForm::scale) return 1;
-  return component_g(other) * (second ? component_g(*second) : 1);
+ForceFactor Target::factor() const {
+  return form == TermForm::scale ? ForceFactor{other, second} : ForceFactor{};
 }
 
 double Target::factor_at(const Visit& visit) const {

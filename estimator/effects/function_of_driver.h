@@ -29,8 +29,8 @@ struct Target {
   bool mean_in_the_twelve() const;
   const char* unit() const;
   double typical_size() const;
-  /// What the function is multiplied with: for a scale the components, g or g².
-  double factor(const TermInput& input) const;
+  /// What the function is multiplied with: for a scale the components.
+  ForceFactor factor() const;
   /// The same for an angle.
   double factor_at(const Visit& visit) const;
 };

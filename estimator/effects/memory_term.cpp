@@ -252,9 +252,7 @@ class MemoryTerm final : public SmoothTerm {
   double term_g(const TermInput& input, const double* p) const override {
     return term_of_number_g(input, of_visit(input.log, input.axis, input.visit, p));
   }
-  double term_of_number_g(const TermInput& input, double f) const override {
-    return target_.factor(input) * f;
-  }
+  ForceFactor factor() const override { return target_.factor(); }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     displace_by_number(log, visit, of_visit(log, 0, visit, p), p, head);

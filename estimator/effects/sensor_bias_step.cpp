@@ -46,10 +46,17 @@ class BiasStep final : public Effect {
     return {};
   }
   double term_g(const TermInput& input, const double* p) const override {
-    return p[0] * share_from(input.at(), p[1]);
+    return term(input.at(), p);
+  }
+  std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t,
+                                        const double* p) const override {
+    std::vector<double> numbers;
+    for (const Visit& visit : log.visits) numbers.push_back(term(visit, p));
+    return numbers;
   }
 
  private:
+  static double term(const Visit& visit, const double* p) { return p[0] * share_from(visit, p[1]); }
   /// Share of the samples of a visit at or after an instant.
   static double share_from(const Visit& visit, double t_s) {
     if (t_s <= visit.t_arrival_s) return 1;

@@ -94,6 +94,7 @@ class TurnAboutAxes final : public WrappedTerm {
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
+      if (!acts_about(axis, p)) continue;
       HeadGeometry by;
       term().displace(log, visit, about(axis, p).data(), by);
       head.*axes_[axis].angle += by.*moves_;
@@ -106,6 +107,12 @@ class TurnAboutAxes final : public WrappedTerm {
     std::size_t of_term;
     std::optional<std::size_t> axis;
   };
+  /// Whether any of the amplitudes of one of the axes is not zero.
+  bool acts_about(std::size_t axis, const double* p) const {
+    for (std::size_t k = 0; k < own_.size(); ++k)
+      if (own_[k].axis == axis && p[k] != 0) return true;
+    return false;
+  }
   /// The term's own parameters where it turns about one of the axes.
   std::vector<double> about(std::size_t axis, const double* p) const {
     std::vector<double> of_term;

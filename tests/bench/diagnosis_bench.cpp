@@ -7,7 +7,7 @@
 #include <string>
 
 #include "estimator/calibrate.h"
-#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/candidate_responses.h"
 #include "rig/sim/record.h"
 #include "rig/sim/world.h"
 #include "tests/bench/limit.h"

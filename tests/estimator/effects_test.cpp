@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/candidate_gains.h"
 #include "estimator/diagnosis/enlarged_model.h"
 #include "estimator/effects/catalogue.h"
 #include "estimator/effects/covariate.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "estimator/diagnosis/candidates.h"
+#include "estimator/diagnosis/candidate_responses.h"
 #include "estimator/effects/smooth_term.h"
 #include "estimator/error_figures.h"
 #include "estimator/fit/generalised_fit.h"
