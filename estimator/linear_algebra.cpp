@@ -29,9 +29,8 @@ const bool kThreadSafe = [] {
 // Matrices of megabytes come and go all the time. Given back to the kernel each time, their memory
 // would have to be mapped and zeroed again for the next: a sixth of the time of a diagnosis.
 [[maybe_unused]] const bool kMemoryIsKept = [] {
-  constexpr int kLargestOnHeap = 32 << 20;  // as much as glibc allows
   constexpr int kKept = 1 << 30;
-  return mallopt(M_MMAP_THRESHOLD, kLargestOnHeap) == 1 && mallopt(M_TRIM_THRESHOLD, kKept) == 1;
+  return mallopt(M_MMAP_MAX, 0) == 1 && mallopt(M_TRIM_THRESHOLD, kKept) == 1;
 }();
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "estimator/diagnosis/candidate_gains.h"
 
 #include <Eigen/QR>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -42,36 +41,44 @@ std::vector<std::size_t> special_cases(const CandidateResponses& responses, cons
   return found;
 }
 
+namespace {
+
+/// From columns with these products among each other, of which the model takes up the products
+/// `lost`, to orthonormal directions of what it leaves: Gram–Schmidt in that metric.
+Eigen::MatrixXd to_orthonormal(const Eigen::MatrixXd& whole, const Eigen::MatrixXd& lost) {
+  constexpr double kAbsorbed = 1e-3;  // what is left of an absorbed effect is rounding, no evidence
+  const Eigen::Index count = whole.cols();
+  const Eigen::MatrixXd gram = whole - lost;
+  Eigen::MatrixXd transform(0, count);
+  for (Eigen::Index j = 0; j < count; ++j) {
+    Eigen::RowVectorXd direction = Eigen::RowVectorXd::Unit(count, j);
+    for (Eigen::Index k = 0; k < transform.rows(); ++k)
+      direction -= transform.row(k).dot(gram.col(j)) * transform.row(k);
+    const double square = (direction * gram * direction.transpose()).value();
+    if (!(square > kAbsorbed * kAbsorbed * whole(j, j)) || !(square > 0)) continue;
+    transform.conservativeResize(transform.rows() + 1, Eigen::NoChange);
+    transform.row(transform.rows() - 1) = direction / std::sqrt(square);
+  }
+  return transform;
+}
+
+}  // namespace
+
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
     : responses_(responses), fit_(fit) {
   model_basis_ = orthonormal_basis(fit.whitened_jacobian);
   residual_ = project(fit.whitened_residual);
-  std::array<Eigen::MatrixXd, CandidateResponses::kGroups>
-      taken;  // by the model's parameters, columns × p
-  parallel_for(taken.size(),
-               [&](std::size_t g) { taken[g] = responses.groups[g].products(model_basis_); });
   transform_.resize(responses.place.size());
-  parallel_for(transform_.size(), [&](std::size_t c) {
-    const auto& [g, first, count] = responses.place[c];
-    const auto means = responses.groups[g].means.middleCols(first, count);
-    const auto dwells = responses.groups[g].dwells.middleCols(first, count);
-    const auto lost = taken[g].middleRows(first, count);
-    const Eigen::MatrixXd whole = means.transpose() * means + dwells.transpose() * dwells;
-    const Eigen::MatrixXd gram = whole - lost * lost.transpose();
-    // Gram-Schmidt in the metric of what the model leaves.
-    Eigen::MatrixXd transform(0, count);
-    for (Eigen::Index j = 0; j < count; ++j) {
-      Eigen::RowVectorXd direction = Eigen::RowVectorXd::Unit(count, j);
-      for (Eigen::Index k = 0; k < transform.rows(); ++k)
-        direction -= transform.row(k).dot(gram.col(j)) * transform.row(k);
-      const double square = (direction * gram * direction.transpose()).value();
-      // What is left of an absorbed effect is rounding, not evidence.
-      constexpr double kAbsorbed = 1e-3;
-      if (!(square > kAbsorbed * kAbsorbed * whole(j, j)) || !(square > 0)) continue;
-      transform.conservativeResize(transform.rows() + 1, Eigen::NoChange);
-      transform.row(transform.rows() - 1) = direction / std::sqrt(square);
+  const std::vector<CandidateResponses::Block> blocks = responses.blocks();
+  parallel_for(blocks.size(), [&](std::size_t b) {
+    const auto& [g, first, count, candidates] = blocks[b];
+    // By the model's parameters, columns × p.
+    const Eigen::MatrixXd taken = responses.groups[g].products(first, count, model_basis_);
+    for (const std::size_t c : candidates) {
+      const CandidateResponses::Place& at = responses.place[c];
+      const auto lost = taken.middleRows(at.first - first, at.count);
+      transform_[c] = to_orthonormal(responses.gram[c], lost * lost.transpose());
     }
-    transform_[c] = std::move(transform);
   });
 }
 
@@ -80,15 +87,20 @@ Eigen::MatrixXd CandidateGains::project(const Eigen::MatrixXd& whitened) const {
 }
 
 Eigen::MatrixXd CandidateGains::of(const Eigen::MatrixXd& whitened) const {
-  std::array<Eigen::MatrixXd, CandidateResponses::kGroups> seen;  // columns × replicates
-  parallel_for(seen.size(),
-               [&](std::size_t g) { seen[g] = responses_.groups[g].products(whitened); });
-  Eigen::MatrixXd gain(std::ssize(transform_), whitened.cols());
-  for (std::size_t c = 0; c < transform_.size(); ++c) {
-    const auto& [g, first, count] = responses_.place[c];
-    gain.row(static_cast<Eigen::Index>(c)) =
-        (transform_[c] * seen[g].middleRows(first, count)).colwise().squaredNorm();
-  }
+  Eigen::MatrixXd gain(whitened.cols(), std::ssize(transform_));
+  const std::vector<CandidateResponses::Block> blocks = responses_.blocks();
+  parallel_for(blocks.size(), [&](std::size_t b) {
+    const auto& [g, first, count, candidates] = blocks[b];
+    const Eigen::MatrixXd seen = responses_.groups[g].products(first, count, whitened);
+    for (const std::size_t c : candidates) {
+      const CandidateResponses::Place& at = responses_.place[c];
+      gain.col(static_cast<Eigen::Index>(c)) =
+          (transform_[c] * seen.middleRows(at.first - first, at.count))
+              .colwise()
+              .squaredNorm()
+              .transpose();
+    }
+  });
   return gain;
 }
 
@@ -100,9 +112,9 @@ Eigen::VectorXd CandidateGains::of_residual_as_they_stand() const {
     const CandidateResponses::Group whole{
         group.first_row, group.means.middleCols(first, count).rowwise().sum(),
         group.first_dwell_row, group.dwells.middleCols(first, count).rowwise().sum()};
-    const double seen = whole.products(residual_).value();
+    const double seen = whole.products(0, 1, residual_).value();
     const double square = whole.means.squaredNorm() + whole.dwells.squaredNorm() -
-                          whole.products(model_basis_).squaredNorm();
+                          whole.products(0, 1, model_basis_).squaredNorm();
     gain(static_cast<Eigen::Index>(c)) = 2 * seen - square;
   }
   return gain;

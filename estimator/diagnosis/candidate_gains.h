@@ -20,11 +20,11 @@ class CandidateGains {
   CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit);
 
   /// By how much each candidate would lower the sum of squares of the fit's residual.
-  Eigen::VectorXd of_residual() const { return of(residual_).col(0); }
+  Eigen::VectorXd of_residual() const { return of(residual_).row(0); }
   /// The same of candidates as they stand: their amplitudes are not free.
   Eigen::VectorXd of_residual_as_they_stand() const;
   /// The same as of_residual() of `whitened` (stacked rows, free of what the model's parameters
-  /// take up; one column a replicate): candidates × columns.
+  /// take up; one column a replicate): columns × candidates.
   Eigen::MatrixXd of(const Eigen::MatrixXd& whitened) const;
   /// Free directions of a candidate; 0 when the model absorbs it.
   int dof(std::size_t candidate) const { return static_cast<int>(transform_[candidate].rows()); }

@@ -51,19 +51,19 @@ struct Baseline {
 };
 
 // Term of a sensor effect on its axis, V, n rows.
-void set_sensor_response(const Baseline& base, const SingleAmplitude& single,
-                         Eigen::Ref<Eigen::VectorXd> change) {
-  const ActiveEffect& active = single.active;
-  const double K_V_per_g = base.model.twelve[active.axis](static_cast<Eigen::Index>(active.axis));
+void set_sensor_response(const Baseline& base, const Candidate& candidate,
+                         const SingleAmplitude& single, Eigen::Ref<Eigen::VectorXd> change) {
+  const std::size_t axis = candidate.axis;
+  const double K_V_per_g = base.model.twelve[axis](static_cast<Eigen::Index>(axis));
   if (single.number.empty()) {
     for (Eigen::Index k = 0; k < change.size(); ++k)
-      change(k) = K_V_per_g * active.effect->term_g(base.input(active.axis, k), active.p.data());
+      change(k) = K_V_per_g * candidate.effect->term_g(base.input(axis, k), single.p.data());
     return;
   }
-  const ForceFactor factor = active.effect->factor();
+  const ForceFactor factor = candidate.effect->factor();
   for (std::size_t k = 0; k < single.number.size(); ++k)
     change(static_cast<Eigen::Index>(k)) =
-        K_V_per_g * (single.number[k] * factor.of(base.a_g[k], active.axis));
+        K_V_per_g * (single.number[k] * factor.of(base.a_g[k], axis));
 }
 
 // What a head effect changes on all axes, V, 3n rows, to first order. What it changes in the terms
@@ -95,9 +95,10 @@ std::size_t group_of(const Candidate& candidate) {
 }
 
 // The course of the dwells that a sensor effect makes, V, n rows a contrast.
-void set_dwell_response(const Baseline& base, const ActiveEffect& active,
-                        Eigen::Ref<Eigen::VectorXd> change) {
+void set_dwell_response(const Baseline& base, const Candidate& candidate,
+                        const SingleAmplitude& single, Eigen::Ref<Eigen::VectorXd> change) {
   const Eigen::Index n = base.visits();
+  const ActiveEffect active{candidate.effect, candidate.axis, single.p, {}};
   for (Eigen::Index k = 0; k < n; ++k) {
     const Eigen::VectorXd contrasts = dwell_contrasts_V(base.input(active.axis, k), active);
     for (Eigen::Index d = 0; d < contrasts.size(); ++d) change(d * n + k) = contrasts(d);
@@ -118,29 +119,36 @@ void set_head_dwell_response(const Baseline& base, const SingleAmplitude::Course
 
 }  // namespace
 
-Eigen::MatrixXd CandidateResponses::Group::products(const Eigen::MatrixXd& stacked) const {
-  Eigen::MatrixXd result = means.transpose() * stacked.middleRows(first_row, means.rows());
+Eigen::MatrixXd CandidateResponses::Group::products(Eigen::Index first, Eigen::Index count,
+                                                    const Eigen::MatrixXd& stacked) const {
+  Eigen::MatrixXd result =
+      means.middleCols(first, count).transpose() * stacked.middleRows(first_row, means.rows());
   if (dwells.rows() > 0)
-    result += dwells.transpose() * stacked.middleRows(first_dwell_row, dwells.rows());
+    result += dwells.middleCols(first, count).transpose() *
+              stacked.middleRows(first_dwell_row, dwells.rows());
   return result;
 }
 
-namespace {
-
-struct Block {  // of neighbouring columns of a group
-  std::size_t group;
-  Eigen::Index first, count;
-};
-std::vector<Block> blocks_of(const CandidateResponses& responses) {
-  constexpr Eigen::Index kColumns = 192;
-  std::vector<Block> blocks;
+std::vector<CandidateResponses::Block> CandidateResponses::blocks() const {
+  constexpr Eigen::Index kLargest = 1 << 16;  // numbers
+  std::vector<Block> all;
+  std::array<std::vector<std::size_t>, kGroups> of_group;
+  for (std::size_t c = 0; c < place.size(); ++c) of_group[place[c].group].push_back(c);
   for (std::size_t g = 0; g < kGroups; ++g) {
-    const Eigen::Index columns = responses.groups[g].means.cols();
-    for (Eigen::Index first = 0; first < columns; first += kColumns)
-      blocks.push_back({g, first, std::min(kColumns, columns - first)});
+    const Eigen::Index rows = groups[g].means.rows() + groups[g].dwells.rows();
+    for (const std::size_t c : of_group[g]) {
+      const auto& [group, first, count] = place[c];
+      const bool fits = !all.empty() && all.back().group == group &&
+                        (all.back().count + count) * rows <= kLargest;
+      if (!fits) all.push_back({group, first, 0, {}});
+      all.back().count += count;
+      all.back().candidates.push_back(c);
+    }
   }
-  return blocks;
+  return all;
 }
+
+namespace {
 
 std::size_t first_axis(std::size_t group) { return is_head(group) ? 0 : group % kAxisCount; }
 
@@ -150,41 +158,46 @@ CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateLis
                                          const EnlargedParameters& model) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
   CandidateResponses responses;
-  std::array<std::vector<const SingleAmplitude*>, kGroups> singles;
+  struct Column {
+    const Candidate* candidate;
+    const SingleAmplitude* single;
+  };
+  std::array<std::vector<Column>, kGroups> columns;
   std::vector<std::vector<SingleAmplitude>> own(list.candidates.size());
   for (std::size_t c = 0; c < own.size(); ++c) {
     const Candidate& candidate = list.candidates[c];
     if (!candidate.singles) own[c] = single_amplitudes(log, candidate.active());
     const auto& of_candidate = candidate.singles ? *candidate.singles : own[c];
     const std::size_t group = group_of(candidate);
-    responses.place.push_back({group, std::ssize(singles[group]), std::ssize(of_candidate)});
-    for (const SingleAmplitude& single : of_candidate) singles[group].push_back(&single);
+    responses.place.push_back({group, std::ssize(columns[group]), std::ssize(of_candidate)});
+    for (const SingleAmplitude& single : of_candidate)
+      columns[group].push_back({&candidate, &single});
   }
   for (std::size_t g = 0; g < kGroups; ++g) {
     CandidateResponses::Group& group = responses.groups[g];
-    const Eigen::Index columns = std::ssize(singles[g]);
+    const Eigen::Index count = std::ssize(columns[g]);
     const auto axis = static_cast<Eigen::Index>(first_axis(g));
     const Eigen::Index rows = is_head(g) ? mean_rows(log) : n;
     group.first_row = axis * n;
-    group.means.resize(rows, columns);
+    group.means.resize(rows, count);
     group.first_dwell_row = mean_rows(log) + axis * log.dwell_contrasts() * n;
-    group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * rows : 0, columns);
+    group.dwells.resize(is_within_dwell(g) ? log.dwell_contrasts() * rows : 0, count);
   }
   const Baseline base(log, model);
-  const std::vector<Block> blocks = blocks_of(responses);
+  const std::vector<CandidateResponses::Block> blocks = responses.blocks();
   parallel_for(blocks.size(), [&](std::size_t b) {
-    const auto& [g, first, count] = blocks[b];
+    const auto& [g, first, count, candidates] = blocks[b];
     CandidateResponses::Group& group = responses.groups[g];
     auto means = group.means.middleCols(first, count);
     auto dwells = group.dwells.middleCols(first, count);
     for (Eigen::Index j = 0; j < count; ++j) {
-      const SingleAmplitude& single = *singles[g][static_cast<std::size_t>(first + j)];
+      const auto& [candidate, single] = columns[g][static_cast<std::size_t>(first + j)];
       if (is_head(g)) {
-        set_head_response(base, single, means.col(j));
-        if (is_within_dwell(g)) set_head_dwell_response(base, single.course, dwells.col(j));
+        set_head_response(base, *single, means.col(j));
+        if (is_within_dwell(g)) set_head_dwell_response(base, single->course, dwells.col(j));
       } else {
-        set_sensor_response(base, single, means.col(j));
-        if (is_within_dwell(g)) set_dwell_response(base, single.active, dwells.col(j));
+        set_sensor_response(base, *candidate, *single, means.col(j));
+        if (is_within_dwell(g)) set_dwell_response(base, *candidate, *single, dwells.col(j));
       }
     }
   });
@@ -194,9 +207,10 @@ CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateLis
 CandidateResponses whitened(CandidateResponses responses_V, const VisitLog& log,
                             const PoseWhitening& whitening) {
   const auto n = static_cast<Eigen::Index>(log.visits.size());
-  const std::vector<Block> blocks = blocks_of(responses_V);
+  const std::vector<CandidateResponses::Block> blocks = responses_V.blocks();
+  responses_V.gram.resize(responses_V.place.size());
   parallel_for(blocks.size(), [&](std::size_t b) {
-    const auto& [g, first, count] = blocks[b];
+    const auto& [g, first, count, candidates] = blocks[b];
     auto means = responses_V.groups[g].means.middleCols(first, count);
     auto dwells = responses_V.groups[g].dwells.middleCols(first, count);
     const std::size_t axis = first_axis(g);
@@ -206,6 +220,12 @@ CandidateResponses whitened(CandidateResponses responses_V, const VisitLog& log,
     for (Eigen::Index d = 0; d * n < dwells.rows(); ++d)
       dwells.middleRows(d * n, n) /=
           whitening.dwell_sd_V[axis + static_cast<std::size_t>(d / contrasts)](d % contrasts);
+    for (const std::size_t c : candidates) {
+      const CandidateResponses::Place& at = responses_V.place[c];
+      const auto of_means = means.middleCols(at.first - first, at.count);
+      const auto of_dwells = dwells.middleCols(at.first - first, at.count);
+      responses_V.gram[c] = of_means.transpose() * of_means + of_dwells.transpose() * of_dwells;
+    }
   });
   return responses_V;
 }
@@ -223,6 +243,7 @@ CandidateResponses some_of(const CandidateResponses& responses,
   for (const std::size_t c : candidates) {
     const auto& [g, first, count] = responses.place[c];
     some.place.push_back({g, std::ssize(columns[g]), count});
+    if (!responses.gram.empty()) some.gram.push_back(responses.gram[c]);
     for (Eigen::Index j = 0; j < count; ++j) columns[g].push_back(first + j);
   }
   for (std::size_t g = 0; g < kGroups; ++g) {

@@ -19,8 +19,9 @@ struct CandidateResponses {
     Eigen::MatrixXd means;
     Eigen::Index first_dwell_row = 0;
     Eigen::MatrixXd dwells;  ///< no rows for what is constant within the dwell
-    /// Products of the columns with a stacked matrix, columns × its columns.
-    Eigen::MatrixXd products(const Eigen::MatrixXd& stacked) const;
+    /// Products of `count` columns from `first` on with a stacked matrix, count × its columns.
+    Eigen::MatrixXd products(Eigen::Index first, Eigen::Index count,
+                             const Eigen::MatrixXd& stacked) const;
   };
   struct Place {
     std::size_t group = 0;
@@ -31,6 +32,16 @@ struct CandidateResponses {
   static constexpr std::size_t kGroups = 2 * kAxisCount + 2;
   std::array<Group, kGroups> groups;
   std::vector<Place> place;  ///< one per candidate
+  /// Of whitened columns, one per candidate: the products of its columns with each other.
+  std::vector<Eigen::MatrixXd> gram;
+
+  /// Candidates whose columns are neighbours, few enough to stay in the cache.
+  struct Block {
+    std::size_t group;
+    Eigen::Index first, count;
+    std::vector<std::size_t> candidates;
+  };
+  std::vector<Block> blocks() const;
 };
 
 /// One column for each amplitude of each candidate, at the parameters of `model`.

@@ -56,27 +56,27 @@ bool imitates_proven_rounding(const VisitLog& log, const Effect& effect) {
 
 namespace {
 
-/// The hypothesis once per amplitude; one of shapes and indices alone once as it stands.
-std::vector<ActiveEffect> one_by_one(const ActiveEffect& active) {
+/// Values with one of the amplitudes each; of shapes and indices alone as they stand.
+std::vector<std::vector<double>> one_by_one(const ActiveEffect& active) {
   const auto infos = active.effect->parameters();
-  std::vector<ActiveEffect> all;
+  std::vector<std::vector<double>> all;
   for (std::size_t k = 0; k < infos.size(); ++k) {
     if (infos[k].role != ParameterRole::amplitude || active.p[k] == 0) continue;
-    ActiveEffect& single = all.emplace_back(active);
+    std::vector<double>& p = all.emplace_back(active.p);
     for (std::size_t other = 0; other < infos.size(); ++other) {
-      if (other != k && infos[other].role == ParameterRole::amplitude) single.p[other] = 0;
+      if (other != k && infos[other].role == ParameterRole::amplitude) p[other] = 0;
     }
   }
-  if (all.empty()) all.push_back(active);
+  if (all.empty()) all.push_back(active.p);
   return all;
 }
 
-std::vector<SingleAmplitude::Displacement> displacements(const VisitLog& log,
-                                                         const ActiveEffect& active) {
+std::vector<SingleAmplitude::Displacement> displacements(const VisitLog& log, const Effect& effect,
+                                                         const double* p) {
   Eigen::MatrixXd by(std::ssize(log.visits), std::ssize(kHeadAngles));
   for (std::size_t k = 0; k < log.visits.size(); ++k) {
     HeadGeometry displaced;
-    active.effect->displace(log, k, active.p.data(), displaced);
+    effect.displace(log, k, p, displaced);
     for (std::size_t a = 0; a < kHeadAngles.size(); ++a)
       by(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(a)) = displaced.*kHeadAngles[a];
   }
@@ -86,11 +86,11 @@ std::vector<SingleAmplitude::Displacement> displacements(const VisitLog& log,
   return all;
 }
 
-SingleAmplitude::Course course(const VisitLog& log, const ActiveEffect& active) {
+SingleAmplitude::Course course(const VisitLog& log, const Effect& effect, const double* p) {
   SingleAmplitude::Course course;
   course.contrasts_rad.resize(std::ssize(log.visits), log.dwell_contrasts());
   for (std::size_t k = 0; k < log.visits.size(); ++k) {
-    const AngleCourse at = active.effect->angle_course(log, k, active.p.data());
+    const AngleCourse at = effect.angle_course(log, k, p);
     course.angle =
         std::find(kHeadAngles.begin(), kHeadAngles.end(), at.angle) - kHeadAngles.begin();
     course.contrasts_rad.row(static_cast<Eigen::Index>(k)) = contrasts_rad(log, k, at).transpose();
@@ -101,19 +101,53 @@ SingleAmplitude::Course course(const VisitLog& log, const ActiveEffect& active) 
 }  // namespace
 
 std::vector<SingleAmplitude> single_amplitudes(const VisitLog& log, const ActiveEffect& active) {
+  const Effect& effect = *active.effect;
   std::vector<SingleAmplitude> singles;
-  for (ActiveEffect& one : one_by_one(active)) {
+  for (std::vector<double>& p : one_by_one(active)) {
     SingleAmplitude& single = singles.emplace_back();
-    if (one.effect->subject() == Subject::sensor) {
-      single.number = one.effect->numbers_of_visits(log, one.axis, one.p.data());
+    if (effect.subject() == Subject::sensor) {
+      single.number = effect.numbers_of_visits(log, active.axis, p.data());
     } else {
-      single.displaced = displacements(log, one);
-      if (one.effect->within_dwell()) single.course = course(log, one);
+      single.displaced = displacements(log, effect, p.data());
+      if (effect.within_dwell()) single.course = course(log, effect, p.data());
     }
-    single.active = std::move(one);
+    single.p = std::move(p);
   }
   return singles;
 }
+
+namespace {
+
+/// Which of the candidates each has its single amplitudes from: itself, or the one of the x axis
+/// that is like it.
+std::vector<std::size_t> shared_with(const std::vector<Candidate>& candidates) {
+  std::vector<std::size_t> from(candidates.size());
+  std::size_t first_of_effect = 0, first_of_axis = 0;
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    const Candidate& candidate = candidates[c];
+    if (candidate.effect != candidates[first_of_effect].effect) first_of_effect = c;
+    if (c == first_of_effect || candidate.axis != candidates[c - 1].axis) first_of_axis = c;
+    const std::size_t like_it = first_of_effect + (c - first_of_axis);
+    const bool shares = candidate.effect->same_numbers_on_axes() &&
+                        candidates[like_it].axis == candidates[first_of_effect].axis &&
+                        candidates[like_it].hypothesis.p == candidate.hypothesis.p;
+    from[c] = shares ? like_it : c;
+  }
+  return from;
+}
+
+void work_out_singles(const VisitLog& log, std::vector<Candidate>& candidates) {
+  const std::vector<std::size_t> from = shared_with(candidates);
+  parallel_for(candidates.size(), [&](std::size_t c) {
+    if (from[c] == c)
+      candidates[c].singles = std::make_shared<const std::vector<SingleAmplitude>>(
+          single_amplitudes(log, candidates[c].active()));
+  });
+  for (std::size_t c = 0; c < candidates.size(); ++c)
+    candidates[c].singles = candidates[from[c]].singles;
+}
+
+}  // namespace
 
 CandidateList all_candidates(const VisitLog& log,
                              const std::vector<std::shared_ptr<const Effect>>& own) {
@@ -137,11 +171,7 @@ CandidateList all_candidates(const VisitLog& log,
     list.owned.push_back(effect);
     add_candidates(list, log, *effect);
   }
-  parallel_for(list.candidates.size(), [&](std::size_t c) {
-    Candidate& candidate = list.candidates[c];
-    candidate.singles = std::make_shared<const std::vector<SingleAmplitude>>(
-        single_amplitudes(log, candidate.active()));
-  });
+  work_out_singles(log, list.candidates);
   return list;
 }
 

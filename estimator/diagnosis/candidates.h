@@ -30,7 +30,7 @@ struct SingleAmplitude {
     Eigen::MatrixXd contrasts_rad;
   };
 
-  ActiveEffect active;
+  std::vector<double> p;
   std::vector<double> number;           ///< sensor: numbers_of_visits()
   std::vector<Displacement> displaced;  ///< head
   Course course;                        ///< head, within the dwell
@@ -47,7 +47,8 @@ struct Candidate {
   double handicap = 0;     ///< log-probability by which it must beat those without
   /// Single readings of a coarse converter stray further than Gaussian noise does.
   bool of_one_coarse_reading = false;
-  /// Worked out in advance for a candidate that is looked at in many models.
+  /// Worked out in advance for a candidate that is looked at in many models; axes of which the
+  /// visits make the same share them.
   std::shared_ptr<const std::vector<SingleAmplitude>> singles = {};
 
   bool has_name() const { return handicap == 0; }

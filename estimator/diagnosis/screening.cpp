@@ -38,18 +38,20 @@ double effective_looks(const CandidateGains& gains_of, std::size_t candidates, E
     for (double& value : noise.col(static_cast<Eigen::Index>(replicate))) value = normal(generator);
   });
   const Eigen::MatrixXd gains = gains_of.of(gains_of.project(noise));
-  Eigen::VectorXd log_none(gains.cols());  // that no candidate does as well in such noise
-  parallel_for(static_cast<std::size_t>(gains.cols()), [&](std::size_t replicate) {
+  // Among candidates of equal freedom the largest gain is the least probable.
+  std::map<int, Eigen::VectorXd> largest;  // one per replicate
+  for (std::size_t c = 0; c < candidates; ++c) {
+    const auto gain = gains.col(static_cast<Eigen::Index>(c));
+    Eigen::VectorXd& most = largest.try_emplace(gains_of.dof(c), gain).first->second;
+    most = most.cwiseMax(gain);
+  }
+  largest.erase(0);
+  Eigen::VectorXd log_none(replicates);  // that no candidate does as well in such noise
+  parallel_for(static_cast<std::size_t>(replicates), [&](std::size_t replicate) {
     const auto r = static_cast<Eigen::Index>(replicate);
-    // Among candidates of equal freedom the largest gain is the least probable.
-    std::map<int, double> largest;
-    for (std::size_t c = 0; c < candidates; ++c) {
-      double& gain = largest[gains_of.dof(c)];
-      gain = std::max(gain, gains(static_cast<Eigen::Index>(c), r));
-    }
     double best = 0;
     for (const auto& [dof, gain] : largest)
-      if (dof > 0) best = std::min(best, log_chi_squared_tail(gain, dof));
+      best = std::min(best, log_chi_squared_tail(gain(r), dof));
     log_none(r) = std::log1p(-std::exp(std::min(best, -1e-12)));
   });
   return std::max(1.0, -static_cast<double>(replicates) / log_none.sum());

@@ -52,9 +52,11 @@ SlowCandidates slow_candidates(const SearchInput& input, const CandidateList& li
   const Eigen::MatrixXd basis = orthonormal_basis(look.beside);
   SlowCandidates slow;
   slow.list.family_size = list.family_size;
+  std::vector<char> is_slow(index.size());
+  parallel_for(index.size(), [&](std::size_t c) { is_slow[c] = is_within(responses_V, c, basis); });
   std::vector<std::size_t> within;
   for (std::size_t c = 0; c < index.size(); ++c) {
-    if (!is_within(responses_V, c, basis)) continue;
+    if (!is_slow[c]) continue;
     slow.list.candidates.push_back(open.candidates[c]);
     slow.index.push_back(index[c]);
     within.push_back(c);

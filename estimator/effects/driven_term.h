@@ -52,6 +52,9 @@ class DrivenTerm : public SmoothTerm {
     return term_of_number_g(input, f);
   }
   ForceFactor factor() const override { return target_.factor(); }
+  bool same_numbers_on_axes() const override {
+    return driver_->same_on_axes && !driver_->output_of;
+  }
   /// What tilts the base towards a direction may do so along an axis after all.
   std::vector<Hypothesis> in_one(const VisitLog&, std::size_t, const Effect& repeated,
                                  const std::vector<std::vector<double>>& p) const override {

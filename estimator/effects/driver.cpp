@@ -155,6 +155,7 @@ DriverPointer shared(Driver driver) {
   for (const std::vector<double>& of_axis : driver.value)
     driver.fewest_values =
         std::min(driver.fewest_values, std::set<double>(of_axis.begin(), of_axis.end()).size());
+  driver.same_on_axes = driver.value[0] == driver.value[1] && driver.value[0] == driver.value[2];
   return std::make_shared<const Driver>(std::move(driver));
 }
 

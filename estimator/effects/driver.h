@@ -39,6 +39,7 @@ struct Driver {
   std::string unit() const;
   bool varies() const;
   std::size_t fewest_values = 0;  ///< different ones on any axis at least; counted by shared()
+  bool same_on_axes = false;      ///< seen by shared()
   bool way_begins(std::size_t visit) const { return visit == 0 || visit == begins_anew; }
   bool is_clock() const { return name == "t_s"; }
   bool is_rate() const { return name.ends_with(".rate"); }  ///< of a recorded column

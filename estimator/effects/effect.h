@@ -126,6 +126,8 @@ class Effect {
     return {};
   }
   virtual ForceFactor factor() const { return {}; }
+  /// Sensor: whether those numbers are the same whatever the axis.
+  virtual bool same_numbers_on_axes() const { return false; }
   /// term_g() and displace() from that number.
   double term_of_number_g(const TermInput& input, double number) const {
     return number * factor().of(input.a_g[input.visit], input.axis);

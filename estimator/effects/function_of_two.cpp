@@ -46,6 +46,9 @@ class LineTimesHarmonic final : public DrivenTerm {
     }
     return starts;
   }
+  bool same_numbers_on_axes() const override {
+    return DrivenTerm::same_numbers_on_axes() && angle_->same_on_axes;
+  }
 
  private:
   std::string function() const override {
@@ -97,6 +100,9 @@ class LineTimesLine final : public DrivenTerm {
     const double size = target().typical_size();
     return {{{low, high, *other_low, *other_high, size, size, size}}};
   }
+  bool same_numbers_on_axes() const override {
+    return DrivenTerm::same_numbers_on_axes() && other_->same_on_axes;
+  }
 
  private:
   std::string function() const override { return "straight line, times that of " + other_->name; }
@@ -130,6 +136,7 @@ class LineTimesField final : public DrivenTerm {
     const double m2 = axis == 2 ? 0 : m1;  // the spindle axis never sees y_b
     return {{{low, high, 0, 0, m1, m2}}, {{low, high, m1, m2, m1, m2}}};
   }
+  bool same_numbers_on_axes() const override { return false; }  // each sees its share of it
 
  private:
   std::string function() const override { return "straight line, times a field of the base"; }
@@ -165,6 +172,9 @@ class LineOnOneSide final : public DrivenTerm {
     for (int k = 0; k < kParts; ++k)
       starts.push_back({{low, high, effect::kTurn_rad * k / kParts, size, size}});
     return starts;
+  }
+  bool same_numbers_on_axes() const override {
+    return DrivenTerm::same_numbers_on_axes() && delta_->same_on_axes && h_->same_on_axes;
   }
 
  private:
@@ -227,6 +237,9 @@ class LineInAPart final : public DrivenTerm {
       }
     return others;
   }
+  bool same_numbers_on_axes() const override {
+    return DrivenTerm::same_numbers_on_axes() && angle_->same_on_axes;
+  }
 
  private:
   static constexpr double kApart_rad = 15 * kRadPerDeg;
@@ -272,6 +285,9 @@ class HarmonicTimesHarmonic final : public DrivenTerm {
             {{static_cast<double>(n), static_cast<double>(m), size, size, size, size}});
     return starts;
   }
+  bool same_numbers_on_axes() const override {
+    return DrivenTerm::same_numbers_on_axes() && other_->same_on_axes;
+  }
 
  private:
   std::string function() const override { return "harmonic, times a harmonic of " + other_->name; }
@@ -313,6 +329,9 @@ class Spot final : public DrivenTerm {
                              std::lerp(*low, *high, static_cast<double>(across) / (kAcross - 1)),
                              0.6 * width_rad, target().typical_size()}});
     return starts;
+  }
+  bool same_numbers_on_axes() const override {
+    return DrivenTerm::same_numbers_on_axes() && other_->same_on_axes;
   }
 
  private:

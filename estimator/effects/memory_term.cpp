@@ -105,6 +105,7 @@ class Memory {
 
   const std::string& name() const { return name_; }
   bool is_of_column() const { return driver_->recorded; }
+  bool same_on_axes() const { return sources() == 1 || driver_->same_on_axes; }
   std::string unit() const {
     if (of_ == MemoryOf::sign) return "";
     return driver_->unit() + (of_ == MemoryOf::square ? "^2" : "");
@@ -253,6 +254,7 @@ class MemoryTerm final : public SmoothTerm {
     return term_of_number_g(input, of_visit(input.log, input.axis, input.visit, p));
   }
   ForceFactor factor() const override { return target_.factor(); }
+  bool same_numbers_on_axes() const override { return memory_->same_on_axes(); }
   void displace(const VisitLog& log, std::size_t visit, const double* p,
                 HeadGeometry& head) const override {
     displace_by_number(log, visit, of_visit(log, 0, visit, p), p, head);
@@ -273,10 +275,10 @@ class MemoryTerm final : public SmoothTerm {
   double of_visit(const VisitLog& log, std::size_t axis, std::size_t visit, const double* p) const {
     const double t0_s = p[2], tau_s = p[3];
     if (!(tau_s > 0) || tau_s > longest_s_) return 0;
-    const double start = p[4] * memory_->share_of_beginning(log.visits[visit], t0_s, tau_s);
-    const double slope = 2 * p[5] / (p[1] - p[0]);
-    const double mean = target_.mean_in_the_twelve() ? 0 : p[7];
-    return mean + start + slope * (memory_->at(tau_s, axis, visit) - p[6]);
+    double sum = target_.mean_in_the_twelve() ? 0 : p[7];
+    if (p[4] != 0) sum += p[4] * memory_->share_of_beginning(log.visits[visit], t0_s, tau_s);
+    if (p[5] != 0) sum += 2 * p[5] / (p[1] - p[0]) * (memory_->at(tau_s, axis, visit) - p[6]);
+    return sum;
   }
 
   std::shared_ptr<const Memory> memory_;

@@ -48,6 +48,7 @@ class BiasStep final : public Effect {
   double term_g(const TermInput& input, const double* p) const override {
     return term(input.at(), p);
   }
+  bool same_numbers_on_axes() const override { return true; }
   std::vector<double> numbers_of_visits(const VisitLog& log, std::size_t,
                                         const double* p) const override {
     std::vector<double> numbers;
