@@ -82,9 +82,7 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
   const VisitLog& log = input.log;
   const auto n = std::ssize(log.visits);
   const Eigen::MatrixXd A = design_of(log, found.fit.parameters);
-  CodeEstimate codes{.before_converter = found, .left_out = {}, .deviation_V = {}};
-  SearchResult& result = codes.before_converter;
-  bool any = false;
+  std::optional<CodeEstimate> codes;  // a copy of what was found is not made for nothing
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     const auto rounded = rounded_axis(log, found, axis);
     if (!rounded) continue;
@@ -95,7 +93,8 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
     const auto quantized =
         quantized_axis(run, A, input.known_V2[axis], known_V, rounded->scale, axis);
     if (!quantized) continue;
-    any = true;
+    if (!codes) codes = {.before_converter = found, .left_out = {}, .deviation_V = {}};
+    SearchResult& result = codes->before_converter;
     // How far the poses scatter beyond their codes is left to the noise, which knows of slow parts.
     result.own_V2[axis] = quantized->variance_without_V2(std::pow(quantized->use.scatter_V, 2));
     const NoisePool pool(input.processes, without_record(input.noise[axis]), result.own_V2[axis]);
@@ -103,7 +102,7 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
     result.observed.mean_V[axis] = quantized->mean_V;
     result.whitening.set(axis, result.noise[axis].covariance);
     if (!rounded->effect) continue;
-    codes.left_out.push_back(*rounded->effect);
+    codes->left_out.push_back(*rounded->effect);
     const ActiveEffect& active = found.fit.parameters.effects[*rounded->effect];
     for (const auto& away : active.effect->one_deviation_away(log, axis, active.p)) {
       const double step = away[kLsb] / active.p[kLsb] - 1;
@@ -111,12 +110,13 @@ std::optional<CodeEstimate> estimate_from_codes(const SearchInput& input, const 
       change_V.segment(static_cast<Eigen::Index>(axis) * n, n) =
           (away[kOrigin] - active.p[kOrigin]) +
           step * (quantized->mean_V.array() - active.p[kOrigin]);
-      codes.deviation_V.push_back(std::move(change_V));
+      codes->deviation_V.push_back(std::move(change_V));
     }
   }
-  if (!any) return std::nullopt;
-  std::sort(codes.left_out.rbegin(), codes.left_out.rend());
-  for (const std::size_t e : codes.left_out) result.remove(e);
+  if (!codes) return std::nullopt;
+  std::sort(codes->left_out.rbegin(), codes->left_out.rend());
+  SearchResult& result = codes->before_converter;
+  for (const std::size_t e : codes->left_out) result.remove(e);
   result.fit = fit_enlarged(log, result.observed, result.whitening, result.fit.parameters);
   if (!result.fit.determined) return std::nullopt;
   return codes;
