@@ -133,9 +133,9 @@ struct Vacancy {
         fit_input{input.log, search.observed, search.whitening},
         without(fit_enlarged(input.log, search.observed, search.whitening, base)),
         found_gain(without.chi2 - search.fit.chi2),
-        gains(search.responses, without),
+        gains(*search.responses, without),
         ranked(best_of_families(list, gains, gains.of_residual())) {
-    assert(result.responses.place.size() == list.candidates.size());
+    assert(result.responses->place.size() == list.candidates.size());
   }
   Vacancy(const Vacancy&) = delete;  // the gains refer to the fit beside them
   Vacancy& operator=(const Vacancy&) = delete;
@@ -221,7 +221,7 @@ std::vector<Alternative> named_rivals(const Vacancy& vacancy) {
     std::optional<CandidateGains> beside;
     std::vector<Rival> order = vacancy.ranked;
     if (!sum.empty()) {
-      beside.emplace(result.responses, fit);
+      beside.emplace(*result.responses, fit);
       order = best_of_families(list, *beside, beside->of_residual());
     }
     const auto best = std::find_if(order.begin(), order.end(), [&](const Rival& r) {

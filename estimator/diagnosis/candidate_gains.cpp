@@ -69,15 +69,21 @@ CandidateGains::CandidateGains(const CandidateResponses& responses, const Enlarg
   model_basis_ = orthonormal_basis(fit.whitened_jacobian);
   residual_ = project(fit.whitened_residual);
   transform_.resize(responses.place.size());
+  of_residual_.resize(std::ssize(transform_));
+  // In one product: memory decides.
+  Eigen::MatrixXd both(model_basis_.rows(), model_basis_.cols() + 1);
+  both << model_basis_, residual_;
   const std::vector<CandidateResponses::Block> blocks = responses.blocks();
   parallel_for(blocks.size(), [&](std::size_t b) {
     const auto& [g, first, count, candidates] = blocks[b];
-    // By the model's parameters, columns × p.
-    const Eigen::MatrixXd taken = responses.groups[g].products(first, count, model_basis_);
+    const Eigen::MatrixXd seen = responses.groups[g].products(first, count, both);
     for (const std::size_t c : candidates) {
       const CandidateResponses::Place& at = responses.place[c];
-      const auto lost = taken.middleRows(at.first - first, at.count);
+      const auto rows = seen.middleRows(at.first - first, at.count);
+      const auto lost = rows.leftCols(model_basis_.cols());  // to the model's parameters
       transform_[c] = to_orthonormal(responses.gram[c], lost * lost.transpose());
+      of_residual_(static_cast<Eigen::Index>(c)) =
+          (transform_[c] * rows.rightCols<1>()).squaredNorm();
     }
   });
 }

@@ -20,7 +20,7 @@ class CandidateGains {
   CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit);
 
   /// By how much each candidate would lower the sum of squares of the fit's residual.
-  Eigen::VectorXd of_residual() const { return of(residual_).row(0); }
+  const Eigen::VectorXd& of_residual() const { return of_residual_; }
   /// The same of candidates as they stand: their amplitudes are not free.
   Eigen::VectorXd of_residual_as_they_stand() const;
   /// The same as of_residual() of `whitened` (stacked rows, free of what the model's parameters
@@ -45,6 +45,7 @@ class CandidateGains {
   /// all but absorbs would be credited with many times over.
   Eigen::VectorXd residual_;
   std::vector<Eigen::MatrixXd> transform_;  ///< dof × columns: to orthonormal directions
+  Eigen::VectorXd of_residual_;
 };
 
 /// What a model is fitted to.

@@ -246,11 +246,11 @@ CandidateResponses some_of(const CandidateResponses& responses,
     if (!responses.gram.empty()) some.gram.push_back(responses.gram[c]);
     for (Eigen::Index j = 0; j < count; ++j) columns[g].push_back(first + j);
   }
-  for (std::size_t g = 0; g < kGroups; ++g) {
+  parallel_for(kGroups, [&](std::size_t g) {
     const CandidateResponses::Group& whole = responses.groups[g];
     some.groups[g] = {whole.first_row, whole.means(Eigen::all, columns[g]), whole.first_dwell_row,
                       whole.dwells(Eigen::all, columns[g])};
-  }
+  });
   return some;
 }
 

@@ -17,16 +17,25 @@ double looks_on_axes(const CandidateList& list, const Candidate& candidate) {
   return kAxisCount * static_cast<double>(list.family_size[candidate.family]);
 }
 
-void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
-                    double handicap) {
-  if (!log.lacking(effect.columns()).empty()) return;
+namespace {
+
+/// Of an effect on each axis (the head: on the first); none where it lacks a column.
+PerAxis<std::vector<Hypothesis>> hypotheses_of(const VisitLog& log, const Effect& effect) {
+  PerAxis<std::vector<Hypothesis>> of_axis;
+  if (!log.lacking(effect.columns()).empty()) return of_axis;
   const std::size_t axes = effect.subject() == Subject::head ? 1 : kAxisCount;
+  for (std::size_t axis = 0; axis < axes; ++axis)
+    if (effect.acts_on(axis)) of_axis[axis] = effect.hypotheses(log, axis);
+  return of_axis;
+}
+
+void add_candidates(CandidateList& list, const Effect& effect, double handicap,
+                    PerAxis<std::vector<Hypothesis>> hypotheses) {
   const auto infos = effect.parameters();
-  for (std::size_t axis = 0; axis < axes; ++axis) {
-    if (!effect.acts_on(axis)) continue;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
     // Hypotheses that free the same amplitudes are the same family.
     std::vector<std::pair<std::vector<bool>, std::size_t>> families;
-    for (Hypothesis& hypothesis : effect.hypotheses(log, axis)) {
+    for (Hypothesis& hypothesis : hypotheses[axis]) {
       std::vector<bool> amplitudes;
       for (std::size_t k = 0; k < infos.size(); ++k) {
         amplitudes.push_back(infos[k].role == ParameterRole::amplitude && hypothesis.p[k] != 0);
@@ -41,6 +50,13 @@ void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effe
       list.candidates.push_back({&effect, axis, std::move(hypothesis), family->second, handicap});
     }
   }
+}
+
+}  // namespace
+
+void add_candidates(CandidateList& list, const VisitLog& log, const Effect& effect,
+                    double handicap) {
+  add_candidates(list, effect, handicap, hypotheses_of(log, effect));
 }
 
 bool imitates_proven_rounding(const VisitLog& log, const Effect& effect) {
@@ -152,24 +168,32 @@ void work_out_singles(const VisitLog& log, std::vector<Candidate>& candidates) {
 CandidateList all_candidates(const VisitLog& log,
                              const std::vector<std::shared_ptr<const Effect>>& own) {
   CandidateList list;
-  for (const Effect* effect : effect_catalogue()) add_candidates(list, log, *effect);
-  if (log.is_coarse()) {
-    for (Candidate& candidate : list.candidates)
-      candidate.of_one_coarse_reading = candidate.effect->concerns_one_visit();
-  }
-  for (auto& effect : covariate_effects(log)) {
+  struct Asked {
+    const Effect* effect;
+    double handicap;
+  };
+  std::vector<Asked> asked;
+  const auto ask = [&](std::shared_ptr<const Effect> effect, double handicap) {
+    asked.push_back({effect.get(), handicap});
     list.owned.push_back(std::move(effect));
-    add_candidates(list, log, *list.owned.back());
-  }
+  };
+  for (const Effect* effect : effect_catalogue()) asked.push_back({effect, 0});
+  for (auto& effect : covariate_effects(log)) ask(std::move(effect), 0);
   for (auto& term : smooth_terms(log, SmoothTermSelection::shown_by_these_visits)) {
     if (imitates_proven_rounding(log, *term)) continue;
     const double handicap = kHandicapOfUnnamed + term->log_choices();
-    list.owned.push_back(std::move(term));
-    add_candidates(list, log, *list.owned.back(), handicap);
+    ask(std::move(term), handicap);
   }
-  for (const auto& effect : own) {
-    list.owned.push_back(effect);
-    add_candidates(list, log, *effect);
+  for (const auto& effect : own) ask(effect, 0);
+
+  std::vector<PerAxis<std::vector<Hypothesis>>> hypotheses(asked.size());
+  parallel_for(asked.size(),
+               [&](std::size_t k) { hypotheses[k] = hypotheses_of(log, *asked[k].effect); });
+  for (std::size_t k = 0; k < asked.size(); ++k)
+    add_candidates(list, *asked[k].effect, asked[k].handicap, std::move(hypotheses[k]));
+  if (log.is_coarse()) {
+    for (Candidate& candidate : list.candidates)
+      candidate.of_one_coarse_reading = candidate.effect->concerns_one_visit();
   }
   work_out_singles(log, list.candidates);
   return list;

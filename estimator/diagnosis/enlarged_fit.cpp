@@ -169,11 +169,12 @@ Eigen::VectorXd whitened_contribution(const EnlargedFit& fit, std::size_t effect
 
 void PoseWhitening::set(std::size_t axis, const Eigen::MatrixXd& covariance_V2) {
   const Eigen::LLT<Eigen::MatrixXd> cholesky(covariance_V2);
-  lower[axis] = cholesky.matrixL();
+  Eigen::MatrixXd lower = cholesky.matrixL();
   // What is no covariance determines no fit.
   if (cholesky.info() != Eigen::Success)
-    lower[axis].setConstant(std::numeric_limits<double>::quiet_NaN());
-  inverse[axis] = inverse_of_triangle(lower[axis]);
+    lower.setConstant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::MatrixXd inverse = inverse_of_triangle(lower);
+  factor[axis] = std::make_shared<const Factor>(Factor{std::move(lower), std::move(inverse)});
 }
 
 void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd> means_V) const {
@@ -182,7 +183,7 @@ void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd>
   while (first < means_V.rows() && (means_V.row(first).array() == 0).all()) ++first;
   const Eigen::Index rest = means_V.rows() - first;
   if (rest == 0) return;  // OpenBLAS complains of empty products
-  const auto triangle = inverse[axis].bottomRightCorner(rest, rest);
+  const auto triangle = inverse(axis).bottomRightCorner(rest, rest);
   // So do the columns of a Jacobian that belong to other axes.
   const auto is_seen = [&](Eigen::Index j) { return (means_V.col(j).array() != 0).any(); };
   for (Eigen::Index j = 0, end = 0; j < means_V.cols(); j = end) {
@@ -195,7 +196,7 @@ void PoseWhitening::apply_to_means(std::size_t axis, Eigen::Ref<Eigen::MatrixXd>
 
 Eigen::MatrixXd PoseWhitening::apply(const Eigen::MatrixXd& all) const {
   Eigen::MatrixXd whitened = all;
-  const Eigen::Index n = lower[0].rows();
+  const Eigen::Index n = lower(0).rows();
   constexpr auto kAxes = static_cast<Eigen::Index>(kAxisCount);
   std::optional<SerialScope> alone;  // one column is done before a thread has started
   if (all.cols() == 1) alone.emplace();

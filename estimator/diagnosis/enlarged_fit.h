@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <memory>
 
 #include "estimator/diagnosis/enlarged_model.h"
 
@@ -11,8 +12,13 @@ namespace plumbline {
 /// n × n lower Cholesky factors of the pose-mean covariance per axis with their inverses, and the
 /// standard deviations of the contrasts, which are independent from visit to visit.
 struct PoseWhitening {
-  PerAxis<Eigen::MatrixXd> lower, inverse;
-  PerAxis<Eigen::VectorXd> dwell_sd_V;  ///< one a contrast
+  struct Factor {
+    Eigen::MatrixXd lower, inverse;
+  };
+  PerAxis<std::shared_ptr<const Factor>> factor;  ///< models that leave an axis as it is share it
+  PerAxis<Eigen::VectorXd> dwell_sd_V;            ///< one a contrast
+  const Eigen::MatrixXd& lower(std::size_t axis) const { return factor[axis]->lower; }
+  const Eigen::MatrixXd& inverse(std::size_t axis) const { return factor[axis]->inverse; }
   /// Takes over the covariance of one axis.
   void set(std::size_t axis, const Eigen::MatrixXd& covariance_V2);
   /// Whitens n rows, the means of one axis, in place.

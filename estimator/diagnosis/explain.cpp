@@ -160,7 +160,7 @@ PropagatedEstimate propagated(const VisitLog& log, const EnlargedFit& fit,
     const auto of_axis = fit.whitened_jacobian.middleRows(static_cast<Eigen::Index>(i) * n, n);
     estimate.value[i] = fit.parameters.twelve[i];
     estimate.gain[i] =
-        fit.covariance.topRows(4 * kAxisCount) * of_axis.transpose() * whitening.inverse[i];
+        fit.covariance.topRows(4 * kAxisCount) * of_axis.transpose() * whitening.inverse(i);
     estimate.rounding_V2[i] = Eigen::VectorXd::Zero(n);
   }
   return estimate;

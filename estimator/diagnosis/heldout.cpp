@@ -13,8 +13,8 @@ Heldout::Heldout(const VisitLog& log, const PerAxis<Eigen::VectorXd>& mean_V,
                  const PoseWhitening& whitening)
     : log_(log), mean_V_(mean_V) {
   parallel_for(kAxisCount, [&](std::size_t i) {
-    inverse_[i] = inverse_from_factor(whitening.lower[i]);
-    mean_V2_[i] = whitening.lower[i].rowwise().squaredNorm();
+    inverse_[i] = inverse_from_factor(whitening.lower(i));
+    mean_V2_[i] = whitening.lower(i).rowwise().squaredNorm();
   });
 }
 

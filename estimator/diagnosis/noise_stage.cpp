@@ -241,14 +241,18 @@ Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameter
   return stage;
 }
 
-void set_whitening(Stage& stage) {
-  parallel_for(kAxisCount,
-               [&](std::size_t i) { stage.whitening.set(i, stage.noise[i].covariance); });
+void set_whitening(Stage& stage, const Before& before) {
+  parallel_for(kAxisCount, [&](std::size_t i) {
+    if (before.known[i] != nullptr && before.whitening != nullptr)
+      stage.whitening.factor[i] = before.whitening->factor[i];
+    else
+      stage.whitening.set(i, stage.noise[i].covariance);
+  });
 }
 
 Stage settle(const SearchInput& input, const EnlargedParameters& parameters, const Before& before) {
   Stage stage = settle_noise(input, parameters, before);
-  set_whitening(stage);
+  set_whitening(stage, before);
   stage.fit = fit_enlarged(input.log, stage.observed, stage.whitening, parameters);
   return stage;
 }

@@ -26,6 +26,7 @@ struct Stage {
 /// What is known before the noise of a model is estimated.
 struct Before {
   PerAxis<const PooledNoise*> known{};               ///< pooled already; null where it has not been
+  const PoseWhitening* whitening = nullptr;          ///< by the noise that is known, if it is there
   const PerAxis<PooledNoise>* start = nullptr;       ///< powers to start from
   const PerAxis<Eigen::VectorXd>* powers = nullptr;  ///< given: nothing is estimated
   /// Means of coarse axes freed of rounding by this stage are used as they are: likelihoods can be
@@ -39,8 +40,8 @@ PerAxis<const PooledNoise*> all_of(const PerAxis<PooledNoise>& noise);
 Stage settle_noise(const SearchInput& input, const EnlargedParameters& parameters,
                    const Before& before, const Eigen::MatrixXd& beside = {});
 
-/// Whitens the means by the noise of the stage.
-void set_whitening(Stage& stage);
+/// Whitens the means by the noise of the stage, which was settled after what is `before`.
+void set_whitening(Stage& stage, const Before& before);
 
 /// The same with the model fitted. Noise and parameters depend on each other only weakly: one round
 /// after the parameters are known settles both.

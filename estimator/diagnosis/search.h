@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -62,8 +63,9 @@ struct SearchResult {
   PerAxis<std::optional<double>> beyond_V2;  ///< RoundingFree's
   PerAxis<PooledNoise> noise;                ///< re-estimated under the final model
   PoseWhitening whitening;
-  CandidateResponses responses;  ///< of the candidates beside the final model
-  double p_best_rest = 1;        ///< p-value of the best candidate that was not taken
+  /// Of the candidates beside the final model: large, shared by copies.
+  std::shared_ptr<const CandidateResponses> responses;
+  double p_best_rest = 1;  ///< p-value of the best candidate that was not taken
 
   /// Takes an effect out of the model and its evidence; the rest is to be fitted anew.
   void remove(std::size_t effect) {

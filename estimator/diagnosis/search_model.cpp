@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -243,7 +244,7 @@ EnlargedFit SearchModel::fit_without(const std::vector<std::size_t>& effects) co
 }
 
 bool SearchModel::adopt(const EnlargedParameters& parameters) {
-  Before before{.start = &stage_.noise};
+  Before before{.whitening = &stage_.whitening, .start = &stage_.noise};
   for (std::size_t axis = 0; noise_is_own_ && axis < kAxisCount; ++axis)
     if (same_on_axis(parameters, stage_.fit.parameters, axis))
       before.known[axis] = &stage_.noise[axis];
@@ -269,7 +270,8 @@ bool SearchModel::adopt(const EnlargedParameters& parameters) {
 
 const CandidateResponses& SearchModel::responses() {
   if (!responses_)
-    responses_ = candidate_responses(input().log, list(), stage_.whitening, stage_.fit.parameters);
+    responses_ = std::make_shared<const CandidateResponses>(
+        candidate_responses(input().log, list(), stage_.whitening, stage_.fit.parameters));
   return *responses_;
 }
 
@@ -484,7 +486,7 @@ SearchResult SearchModel::take_result() {
         sigmas_of(log_chi_squared_tail(lost, dof_of(stage_.fit.parameters.effects[k])))};
   });
   responses();
-  result.responses = std::move(*responses_);
+  result.responses = std::move(responses_);
   result.fit = std::move(stage_.fit);
   result.observed = std::move(stage_.observed);
   result.own_V2 = std::move(stage_.own_V2);

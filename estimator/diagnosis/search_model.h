@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -129,7 +130,7 @@ class SearchModel {
   const SearchOptions* options_;
   Stage stage_;
   bool noise_is_own_ = false;
-  std::optional<CandidateResponses> responses_;
+  std::shared_ptr<const CandidateResponses> responses_;  ///< once they were asked for
   std::vector<std::size_t> chosen_;  ///< candidates, in the order of the model's effects
   std::vector<double> p_values_;
   std::vector<std::size_t> dropped_;  ///< families

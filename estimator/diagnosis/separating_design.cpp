@@ -79,8 +79,8 @@ class NewRows {
       : first_(first), contrasts_(within_dwell ? whitening.dwell_sd_V[0].size() : 0) {
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       // What a pose has for itself once the slow noise is known from its neighbours.
-      std::vector<double> own(static_cast<std::size_t>(whitening.lower[i].rows()));
-      Eigen::Map<Eigen::VectorXd>(own.data(), std::ssize(own)) = whitening.lower[i].diagonal();
+      std::vector<double> own(static_cast<std::size_t>(whitening.lower(i).rows()));
+      Eigen::Map<Eigen::VectorXd>(own.data(), std::ssize(own)) = whitening.lower(i).diagonal();
       mean_sd_V_[i] = median(std::move(own)) / std::sqrt(std::clamp(samples_factor, 1.0, 2.0));
       dwell_sd_V_[i] = whitening.dwell_sd_V[i];
     }

@@ -93,8 +93,9 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
     PerAxis<Eigen::VectorXd> powers;
     for (std::size_t i = 0; i < kAxisCount; ++i)
       powers[i] = plain[i].power + share * (rich.noise[i].power - plain[i].power);
-    Stage stage = settle_noise(input, model, {.powers = &powers, .freed = &rich});
-    set_whitening(stage);
+    const Before before{.powers = &powers, .freed = &rich};
+    Stage stage = settle_noise(input, model, before);
+    set_whitening(stage, before);
     fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
     responses = whitened(slow.responses_V, input.log, stage.whitening);
     gains_of.emplace(responses, fit);
@@ -165,11 +166,12 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
   constexpr double kHopeless = 0.9;  // to first order: its own noise and shapes gain it more
   const EnlargedParameters& model = stage.fit.parameters;
   const Stage rich = settle_beside(input, model, stage, look.beside);
-  Before before{.start = &stage.noise, .freed = &rich};
+  Before before{.whitening = &stage.whitening, .start = &stage.noise, .freed = &rich};
   // The noise that was handed in may have been estimated beside more than the model.
   for (std::size_t axis = 0; noise_is_own && axis < kAxisCount; ++axis)
     if (!rich.coarse[axis]) before.known[axis] = &stage.noise[axis];
-  const PerAxis<PooledNoise> plain = settle_noise(input, model, before).noise;
+  Stage beside_model = settle_noise(input, model, before);
+  const PerAxis<PooledNoise>& plain = beside_model.noise;
   PerAxis<bool> looked_at = look.axes;
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     const double gain = plain[i].likelihood_deviance - rich.noise[i].likelihood_deviance;
@@ -195,10 +197,15 @@ std::optional<SlowFinding> look_among_slow(const SearchInput& input, const Candi
   std::erase_if(ranked,
                 [&](const Scored& s) { return p_of_look(s.log_p, s.candidate) > kHopeless; });
   ranked = likeliest_of_each_kind(list, ranked);
+  if (ranked.empty()) return {};
+  set_whitening(beside_model, before);
   std::vector<Stage> stages(ranked.size());
   parallel_for(stages.size(), [&](std::size_t k) {
     const Candidate& candidate = list.candidates[ranked[k].candidate];
-    Before compared{.known = all_of(plain), .start = &rich.noise, .freed = &rich};
+    Before compared{.known = all_of(plain),
+                    .whitening = &beside_model.whitening,
+                    .start = &rich.noise,
+                    .freed = &rich};
     compared.known[candidate.axis] = nullptr;
     // So little is known of a slow effect that a time constant would run away before the amplitude
     // is known, and sometimes after.

@@ -42,7 +42,7 @@ double scatter_V(const SearchModel& model, std::size_t axis, const Eigen::Vector
   std::vector<double> steps_V;
   for (Eigen::Index k = 1; k < residual_V.size(); ++k)
     steps_V.push_back(std::abs(residual_V(k) - residual_V(k - 1)));
-  const Eigen::VectorXd sd_V = model.stage().whitening.lower[axis].diagonal();
+  const Eigen::VectorXd sd_V = model.stage().whitening.lower(axis).diagonal();
   return std::min(median({sd_V.begin(), sd_V.end()}),
                   sd_of_distances(std::move(steps_V)) / std::sqrt(2.0));
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "estimator/diagnosis/heldout.h"
@@ -165,8 +166,8 @@ void drop_what_worsens(const SearchInput& search, const std::vector<PoseMean>& p
 /// ask what else the readings allow.
 void renew_responses(const SearchInput& search, ValidatedSearch& result) {
   SearchResult& found = result.found;
-  found.responses =
-      candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters);
+  found.responses = std::make_shared<const CandidateResponses>(
+      candidate_responses(search.log, result.candidates, found.whitening, found.fit.parameters));
 }
 
 /// Leaves what carries over to poses that were left out.
