@@ -134,8 +134,8 @@ std::vector<SingleAmplitude> single_amplitudes(const VisitLog& log, const Active
 
 namespace {
 
-/// Which of the candidates each has its single amplitudes from: itself, or the one of the x axis
-/// that is like it.
+/// Which of the candidates each has its single amplitudes from: itself, or the one like it of the
+/// first axis that its effect acts on.
 std::vector<std::size_t> shared_with(const std::vector<Candidate>& candidates) {
   std::vector<std::size_t> from(candidates.size());
   std::size_t first_of_effect = 0, first_of_axis = 0;

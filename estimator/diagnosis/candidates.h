@@ -30,7 +30,7 @@ struct SingleAmplitude {
     Eigen::MatrixXd contrasts_rad;
   };
 
-  std::vector<double> p;
+  std::vector<double> p;                ///< in the order of effect->parameters()
   std::vector<double> number;           ///< sensor: numbers_of_visits()
   std::vector<Displacement> displaced;  ///< head
   Course course;                        ///< head, within the dwell
