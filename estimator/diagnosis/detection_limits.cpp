@@ -201,7 +201,7 @@ std::vector<DetectionLimit> detection_limits(const BesideModel& beside) {
 std::vector<DetectionLimit> detection_limits(const SearchInput& input, const CandidateList& list,
                                              const SearchResult& result) {
   const CandidateGains gains(*result.responses, result.fit);
-  const Eigen::VectorXd gain = gains.of_residual();
+  const Eigen::VectorXd& gain = gains.of_residual();
   return detection_limits(
       {list,
        [&](const Candidate& candidate) {

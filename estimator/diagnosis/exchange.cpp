@@ -103,7 +103,7 @@ std::vector<SearchModel::Entry> exchanges_for(const SearchModel& model,
                        kOfForty * further_names(model, subset);
   const EnlargedParameters others = without_effects(model.stage().fit.parameters, subset);
   const CandidateGains gains(responses, without);
-  const Eigen::VectorXd first_order = gains.of_residual();
+  const Eigen::VectorXd& first_order = gains.of_residual();
   for (const Scored& scored :
        worth_refining(model.list(), screen(model.list(), gains, first_order), most)) {
     const std::size_t index = scored.candidate;
@@ -194,7 +194,7 @@ struct Kind {
   double price = 0;
 };
 std::vector<Kind> kinds_on_axes(const SearchModel& model, const CandidateGains& gains) {
-  const Eigen::VectorXd first_order = gains.of_residual();
+  const Eigen::VectorXd& first_order = gains.of_residual();
   std::vector<Kind> kinds;
   for (const Scored& s : screen(model.list(), gains, first_order)) {
     const Candidate& candidate = model.list().candidates[s.candidate];

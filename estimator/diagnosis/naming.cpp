@@ -68,7 +68,7 @@ std::optional<Next> likeliest_beside(const SearchModel& model, const Some& some,
   std::optional<Next> best;
   double best_score = std::numeric_limits<double>::infinity();
   std::size_t refined = 0;
-  const Eigen::VectorXd first_order = gains.of_residual();
+  const Eigen::VectorXd& first_order = gains.of_residual();
   if (static_cast<double>(most) * kLater * first_order.maxCoeff() < gain) return {};
   for (const Scored& s : screen(some.list, gains, first_order)) {
     const Candidate& candidate = some.list.candidates[s.candidate];

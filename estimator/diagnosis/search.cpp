@@ -203,7 +203,7 @@ class Search {
   /// Adds the best candidate if the search as a whole would not often find as much in noise.
   bool add_one() {
     const CandidateGains gains(model_.responses(), model_.stage().fit);
-    const Eigen::VectorXd first_order = gains.of_residual();
+    const Eigen::VectorXd& first_order = gains.of_residual();
     std::vector<Scored> ranked = screen(list_, gains, first_order);
     // The number of looks hardly changes while the model grows.
     if (model_.looks() == 0)

@@ -99,7 +99,7 @@ std::vector<Scored> screen_with_own_noise(const SearchInput& input, const SlowCa
     fit = fit_enlarged(input.log, stage.observed, stage.whitening, model);
     responses = whitened(slow.responses_V, input.log, stage.whitening);
     gains_of.emplace(responses, fit);
-    const Eigen::VectorXd with_these = gains_of->of_residual();
+    const Eigen::VectorXd& with_these = gains_of->of_residual();
     for (Eigen::Index c = 0; c < gains.size(); ++c) {
       const std::size_t axis = slow.list.candidates[static_cast<std::size_t>(c)].axis;
       gains(c) = std::max(gains(c), with_these(c) + plain[axis].likelihood_deviance -

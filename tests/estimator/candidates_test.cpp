@@ -77,7 +77,7 @@ TEST_F(Candidates, GainIsWhatAColumnTakesOfTheResidualBesideTheModel) {
   const EnlargedFit fit = fit_enlarged(log, observed, whitening, twelve());
   const CandidateResponses responses = candidate_responses(log, list, whitening, fit.parameters);
   const CandidateGains gains(responses, fit);
-  const Eigen::VectorXd of_residual = gains.of_residual();
+  const Eigen::VectorXd& of_residual = gains.of_residual();
   for (std::size_t c = 0; c < list.candidates.size(); c += 17) {
     const auto& [g, first, count] = responses.place[c];
     const CandidateResponses::Group& group = responses.groups[g];
