@@ -6,12 +6,14 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cassert>
 #include <climits>
 #include <cstdlib>
 #include <limits>
 #include <string>
 #include <string_view>
+#include <thread>
 
 // OpenBLAS holds LAPACK, too; its header is a package of its own.
 extern "C" void dlauum_(const char* triangle, const int* n, double* a, const int* lda, int* info);
@@ -27,10 +29,15 @@ const bool kThreadSafe = [] {
 }();
 
 // Matrices of megabytes come and go all the time. Given back to the kernel each time, their memory
-// would have to be mapped and zeroed again for the next: a sixth of the time of a diagnosis.
+// would have to be mapped and zeroed again for the next: a sixth of the time of a diagnosis. No
+// more pools than threads that work at a time: others begin their own, and what was left in those
+// that have ended lies idle.
 [[maybe_unused]] const bool kMemoryIsKept = [] {
+  constexpr int kLargestOnHeap = 32 << 20;  // as much as glibc allows
   constexpr int kKept = 1 << 30;
-  return mallopt(M_MMAP_MAX, 0) == 1 && mallopt(M_TRIM_THRESHOLD, kKept) == 1;
+  const int pools = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  return mallopt(M_MMAP_THRESHOLD, kLargestOnHeap) == 1 && mallopt(M_TRIM_THRESHOLD, kKept) == 1 &&
+         mallopt(M_ARENA_MAX, pools) == 1;
 }();
 
 }  // namespace
