@@ -62,6 +62,21 @@ Eigen::MatrixXd to_orthonormal(const Eigen::MatrixXd& whole, const Eigen::Matrix
   return transform;
 }
 
+/// Calls use(candidate, products of its columns with `stacked`) for each, on all cores.
+template <class Use>
+void for_each_seen(const CandidateResponses& responses, const Eigen::MatrixXd& stacked,
+                   const Use& use) {
+  const std::vector<CandidateResponses::Block> blocks = responses.blocks();
+  parallel_for(blocks.size(), [&](std::size_t b) {
+    const auto& [g, first, count, candidates] = blocks[b];
+    const Eigen::MatrixXd seen = responses.groups[g].products(first, count, stacked);
+    for (const std::size_t c : candidates) {
+      const CandidateResponses::Place& at = responses.place[c];
+      use(c, seen.middleRows(at.first - first, at.count));
+    }
+  });
+}
+
 }  // namespace
 
 CandidateGains::CandidateGains(const CandidateResponses& responses, const EnlargedFit& fit)
@@ -73,18 +88,11 @@ CandidateGains::CandidateGains(const CandidateResponses& responses, const Enlarg
   // In one product: memory decides.
   Eigen::MatrixXd both(model_basis_.rows(), model_basis_.cols() + 1);
   both << model_basis_, residual_;
-  const std::vector<CandidateResponses::Block> blocks = responses.blocks();
-  parallel_for(blocks.size(), [&](std::size_t b) {
-    const auto& [g, first, count, candidates] = blocks[b];
-    const Eigen::MatrixXd seen = responses.groups[g].products(first, count, both);
-    for (const std::size_t c : candidates) {
-      const CandidateResponses::Place& at = responses.place[c];
-      const auto rows = seen.middleRows(at.first - first, at.count);
-      const auto lost = rows.leftCols(model_basis_.cols());  // to the model's parameters
-      transform_[c] = to_orthonormal(responses.gram[c], lost * lost.transpose());
-      of_residual_(static_cast<Eigen::Index>(c)) =
-          (transform_[c] * rows.rightCols<1>()).squaredNorm();
-    }
+  for_each_seen(responses, both, [&](std::size_t c, const auto& seen) {
+    const auto lost = seen.leftCols(model_basis_.cols());  // to the model's parameters
+    transform_[c] = to_orthonormal(responses.gram[c], lost * lost.transpose());
+    of_residual_(static_cast<Eigen::Index>(c)) =
+        (transform_[c] * seen.template rightCols<1>()).squaredNorm();
   });
 }
 
@@ -94,18 +102,9 @@ Eigen::MatrixXd CandidateGains::project(const Eigen::MatrixXd& whitened) const {
 
 Eigen::MatrixXd CandidateGains::of(const Eigen::MatrixXd& whitened) const {
   Eigen::MatrixXd gain(whitened.cols(), std::ssize(transform_));
-  const std::vector<CandidateResponses::Block> blocks = responses_.blocks();
-  parallel_for(blocks.size(), [&](std::size_t b) {
-    const auto& [g, first, count, candidates] = blocks[b];
-    const Eigen::MatrixXd seen = responses_.groups[g].products(first, count, whitened);
-    for (const std::size_t c : candidates) {
-      const CandidateResponses::Place& at = responses_.place[c];
-      gain.col(static_cast<Eigen::Index>(c)) =
-          (transform_[c] * seen.middleRows(at.first - first, at.count))
-              .colwise()
-              .squaredNorm()
-              .transpose();
-    }
+  for_each_seen(responses_, whitened, [&](std::size_t c, const auto& seen) {
+    gain.col(static_cast<Eigen::Index>(c)) =
+        (transform_[c] * seen).colwise().squaredNorm().transpose();
   });
   return gain;
 }

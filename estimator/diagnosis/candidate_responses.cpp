@@ -87,6 +87,7 @@ constexpr std::size_t kGroups = CandidateResponses::kGroups;
 
 bool is_head(std::size_t group) { return group >= kHead; }
 bool is_within_dwell(std::size_t group) { return group >= kAxisCount && group != kHead; }
+std::size_t first_axis(std::size_t group) { return is_head(group) ? 0 : group % kAxisCount; }
 
 std::size_t group_of(const Candidate& candidate) {
   const bool within_dwell = candidate.effect->within_dwell();
@@ -147,12 +148,6 @@ std::vector<CandidateResponses::Block> CandidateResponses::blocks() const {
   }
   return all;
 }
-
-namespace {
-
-std::size_t first_axis(std::size_t group) { return is_head(group) ? 0 : group % kAxisCount; }
-
-}  // namespace
 
 CandidateResponses candidate_responses_V(const VisitLog& log, const CandidateList& list,
                                          const EnlargedParameters& model) {
